@@ -1,0 +1,1 @@
+//! Procedural, seeded scenes.

@@ -1,0 +1,277 @@
+//! What is rendered: meshes, instances, materials, lights, environment and cameras, knowing nothing of the GPU.
+//!
+//! A [`Scene`] comes from a glTF file ([`gltf`]) or is made by a procedure ([`builtin`]). [`FlatScene`] is the same
+//! thing as plain arrays with a BVH, ready for upload.
+
+pub mod alias;
+pub mod builtin;
+pub mod bvh;
+pub mod environment;
+pub mod flat;
+pub mod gltf;
+pub mod gpu_types;
+
+pub use flat::FlatScene;
+
+use glam::{Mat4, Vec2, Vec3, Vec4};
+
+/// A scene as a person thinks of it. Lengths in metres, Y up, right-handed; colours linear Rec. 709.
+#[derive(Debug, Clone, Default)]
+pub struct Scene {
+    /// A name for titles and reports.
+    pub name: String,
+    /// Triangle meshes in their own space.
+    pub meshes: Vec<Mesh>,
+    /// Placements of meshes in the world.
+    pub instances: Vec<Instance>,
+    /// Surface descriptions, referred to by [`Mesh::material`].
+    pub materials: Vec<Material>,
+    /// Images referred to by [`TextureRef::texture`].
+    pub textures: Vec<Texture>,
+    /// Point, spot and directional lights, in world space.
+    pub lights: Vec<PunctualLight>,
+    /// Light from infinitely far away, if any.
+    pub environment: Option<Environment>,
+    /// Cameras of the file, in file order; may be empty.
+    pub cameras: Vec<Camera>,
+    /// How lights move; empty for a static scene.
+    pub motions: Vec<LightMotion>,
+    /// What was odd in the file: one line each, for a person. Never printed by this library.
+    pub warnings: Vec<String>,
+}
+
+/// One indexed triangle list with one material.
+#[derive(Debug, Clone, Default)]
+pub struct Mesh {
+    /// Object-space positions.
+    pub positions: Vec<Vec3>,
+    /// Object-space unit normals, one a position.
+    pub normals: Vec<Vec3>,
+    /// Tangents (xyz unit, w = +1 or -1 the bitangent's sign), one a position, or empty where no normal map needs them.
+    pub tangents: Vec<Vec4>,
+    /// Texture coordinates of each UV set (at most two), one a position each; may be empty.
+    pub uvs: [Vec<Vec2>; 2],
+    /// Linear RGBA vertex colours, one a position; empty means white.
+    pub colors: Vec<Vec4>,
+    /// Three indices a triangle.
+    pub indices: Vec<u32>,
+    /// Index into [`Scene::materials`].
+    pub material: u32,
+}
+
+/// One mesh placed in the world.
+#[derive(Debug, Clone, Copy)]
+pub struct Instance {
+    /// Index into [`Scene::meshes`].
+    pub mesh: u32,
+    /// Object to world; any affine matrix (a negative determinant mirrors the mesh but keeps its front the front).
+    pub transform: Mat4,
+}
+
+/// What to do with the alpha of the base colour.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum AlphaMode {
+    /// Alpha is ignored.
+    Opaque,
+    /// The surface exists where alpha is at least this cutoff.
+    Mask(f32),
+}
+
+/// glTF 2.0 metallic-roughness material.
+#[derive(Debug, Clone)]
+pub struct Material {
+    /// For reports.
+    pub name: String,
+    /// Linear base colour and alpha.
+    pub base_color: Vec4,
+    /// 0 dielectric to 1 metal.
+    pub metallic: f32,
+    /// Perceptual roughness; GGX alpha is its square.
+    pub roughness: f32,
+    /// Emitted radiance (W / (sr m^2) in the file's units), already multiplied by the emissive strength.
+    pub emissive: Vec3,
+    /// Multiplies xy of the normal map.
+    pub normal_scale: f32,
+    /// Alpha handling.
+    pub alpha: AlphaMode,
+    /// Whether the back is a surface too (and emits, where emissive).
+    pub double_sided: bool,
+    /// sRGB base colour and linear alpha.
+    pub base_color_texture: Option<TextureRef>,
+    /// Linear: green roughness, blue metallic.
+    pub metallic_roughness_texture: Option<TextureRef>,
+    /// Linear tangent-space normals.
+    pub normal_texture: Option<TextureRef>,
+    /// sRGB emission.
+    pub emissive_texture: Option<TextureRef>,
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Material {
+            name: String::new(),
+            base_color: Vec4::ONE,
+            metallic: 1.0,
+            roughness: 1.0,
+            emissive: Vec3::ZERO,
+            normal_scale: 1.0,
+            alpha: AlphaMode::Opaque,
+            double_sided: false,
+            base_color_texture: None,
+            metallic_roughness_texture: None,
+            normal_texture: None,
+            emissive_texture: None,
+        }
+    }
+}
+
+/// How a material reads a texture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TextureRef {
+    /// Index into [`Scene::textures`].
+    pub texture: u32,
+    /// Which UV set (0 or 1).
+    pub uv_set: u32,
+    /// KHR_texture_transform: translation in UV units.
+    pub offset: Vec2,
+    /// KHR_texture_transform: rotation in radians, counter-clockwise as the extension defines it.
+    pub rotation: f32,
+    /// KHR_texture_transform: scale.
+    pub scale: Vec2,
+}
+
+/// How texture coordinates outside [0, 1] are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wrap {
+    /// Tile.
+    Repeat,
+    /// Tile, every other tile mirrored.
+    Mirror,
+    /// Hold the edge.
+    Clamp,
+}
+
+/// An image and its sampler.
+#[derive(Debug, Clone)]
+pub struct Texture {
+    /// For reports.
+    pub name: String,
+    /// Width in texels, at least 1.
+    pub width: u32,
+    /// Height in texels, at least 1.
+    pub height: u32,
+    /// RGBA8, row-major from the top, as stored in the file (not decoded from sRGB). Shared, for glTF textures may share an image.
+    pub pixels: std::sync::Arc<Vec<u8>>,
+    /// Wrapping along u and v.
+    pub wrap: [Wrap; 2],
+    /// Whether to interpolate (else nearest).
+    pub linear_filter: bool,
+}
+
+/// A light without extent (KHR_lights_punctual).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PunctualLight {
+    /// Point, spot or directional.
+    pub kind: PunctualKind,
+    /// World position (unused by directional lights).
+    pub position: Vec3,
+    /// World unit direction in which the light shines (unused by point lights).
+    pub direction: Vec3,
+    /// Linear colour times intensity: candela for point and spot, lux for directional.
+    pub intensity: Vec3,
+    /// Distance beyond which the light has no effect, in metres; infinite if none was given.
+    pub range: f32,
+}
+
+/// The kinds of [`PunctualLight`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PunctualKind {
+    /// Shines everywhere from a point.
+    Point,
+    /// Shines in a cone.
+    Spot {
+        /// Angle from the axis at which falloff begins, radians.
+        inner: f32,
+        /// Angle from the axis at which it ends, radians.
+        outer: f32,
+    },
+    /// Shines from infinitely far away along one direction.
+    Directional,
+}
+
+/// Light from infinitely far away: an equirectangular map (see `docs/conventions.md`).
+#[derive(Debug, Clone)]
+pub struct Environment {
+    /// Width in texels; 1 for an even sky.
+    pub width: u32,
+    /// Height in texels.
+    pub height: u32,
+    /// Linear radiance RGB, row-major, the top row looks up (+Y).
+    pub pixels: Vec<[f32; 3]>,
+}
+
+impl Environment {
+    /// The same radiance from everywhere.
+    pub fn even(radiance: Vec3) -> Self {
+        Environment { width: 1, height: 1, pixels: vec![radiance.to_array()] }
+    }
+}
+
+/// A camera in the world: looks along -Z of its node, Y up, as glTF cameras do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    /// For menus and `--camera NAME`.
+    pub name: String,
+    /// World position of the eye.
+    pub position: Vec3,
+    /// Unit direction of view.
+    pub forward: Vec3,
+    /// Unit up direction, orthogonal to `forward`.
+    pub up: Vec3,
+    /// How it projects.
+    pub projection: Projection,
+}
+
+/// How a [`Camera`] projects. The aspect ratio is always the picture's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Projection {
+    /// Vertical field of view in radians.
+    Perspective {
+        /// Full vertical angle.
+        vertical_fov: f32,
+    },
+    /// Half the height of the view volume in metres.
+    Orthographic {
+        /// Half height.
+        half_height: f32,
+    },
+}
+
+/// A punctual light revolving round an axis at a constant rate (report `003`, section 3.3).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LightMotion {
+    /// Index into [`Scene::lights`].
+    pub light: u32,
+    /// A point on the axis.
+    pub center: Vec3,
+    /// Unit axis.
+    pub axis: Vec3,
+    /// Radians a second.
+    pub angular_speed: f32,
+}
+
+impl Camera {
+    /// A perspective camera at `position` that looks at `target` with +Y up (or +Z where it looks straight up or down).
+    pub fn look_at(name: &str, position: Vec3, target: Vec3, vertical_fov: f32) -> Self {
+        let forward = (target - position).try_normalize().unwrap_or(Vec3::NEG_Z);
+        let reference = if forward.y.abs() > 0.9999 { Vec3::Z } else { Vec3::Y };
+        let right = forward.cross(reference).normalize();
+        Camera {
+            name: name.to_owned(),
+            position,
+            forward,
+            up: right.cross(forward),
+            projection: Projection::Perspective { vertical_fov },
+        }
+    }
+}
