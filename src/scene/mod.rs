@@ -7,9 +7,12 @@ pub mod alias;
 pub mod builtin;
 pub mod bvh;
 pub mod environment;
+#[cfg(not(target_arch = "wasm32"))]
+mod files;
 pub mod flat;
 pub mod gltf;
 pub mod gpu_types;
+pub mod tangents;
 
 pub use flat::FlatScene;
 

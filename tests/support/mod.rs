@@ -1,0 +1,3 @@
+//! Helpers shared by test files.
+
+pub mod gltf_writer;
