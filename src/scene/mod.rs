@@ -12,6 +12,7 @@ mod files;
 pub mod flat;
 pub mod gltf;
 pub mod gpu_types;
+pub mod intersect;
 pub mod octahedral;
 pub mod random;
 pub mod shapes;
