@@ -3,6 +3,8 @@
 //! [`scene::Scene`] -> [`scene::FlatScene`] -> `GpuScene` -> `Technique` -> `Film`.
 
 pub mod error;
+pub mod lab;
+pub mod output;
 pub mod scene;
 
 pub use error::{Error, Result};
