@@ -132,6 +132,8 @@ fn exr_of_other_programs_is_read() {
         let grey = decode_exr("grey.exr", &foreign(vec![("Y", half())], encoding)).unwrap();
         assert_eq!(grey.pixels[23], [11.5; 3]);
     }
+    let lossy = foreign(vec![("Y", half())], Encoding { compression: Compression::B44, ..Encoding::UNCOMPRESSED });
+    assert!(matches!(decode_exr("b44.exr", &lossy), Err(restir::Error::Unsupported { .. })));
     let neither = foreign(vec![("R", full()), ("Z", full())], Encoding::UNCOMPRESSED);
     assert!(matches!(decode_exr("z.exr", &neither), Err(restir::Error::BadFile { .. })));
 }
@@ -168,13 +170,21 @@ fn exr_of_absurd_size_is_refused_before_allocation() {
 
 #[test]
 fn exr_with_any_byte_changed_never_panics() {
-    let small = encode_exr(&described(&picture(6, 5))).unwrap();
+    use exr::prelude::*;
+    let tiled = |compression| Encoding { compression, blocks: Blocks::Tiles(Vec2(4, 4)), ..Encoding::UNCOMPRESSED };
+    let noise = || FlatSamples::F16((0..24).map(|i| f16::from_f32((i * 7919 % 1000) as f32)).collect());
+    let mut files = vec![encode_exr(&described(&picture(6, 5))).unwrap()];
+    for compression in [Compression::RLE, Compression::PIZ, Compression::PXR24] {
+        files.push(foreign(vec![("Y", noise())], tiled(compression)));
+    }
     let mut accepted = 0;
-    for at in 0..small.len() {
-        for value in [0, 1, 0x7f, 0x80, 0xff, small[at] ^ 0x10] {
-            let mut bytes = small.clone();
-            bytes[at] = value;
-            accepted += usize::from(decode_exr("changed.exr", &bytes).is_ok());
+    for file in files {
+        for at in 0..file.len() {
+            for value in [0, 1, 0x7f, 0x80, 0xff, file[at] ^ 0x10] {
+                let mut bytes = file.clone();
+                bytes[at] = value;
+                accepted += usize::from(decode_exr("changed.exr", &bytes).is_ok());
+            }
         }
     }
     assert!(accepted > 0, "changes to attributes alone are harmless");

@@ -7,7 +7,7 @@ use ::exr::block::{self, UncompressedBlock};
 use ::exr::image::write::WritableImage;
 use ::exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image as ExrImage, Layer};
 use ::exr::math::Vec2;
-use ::exr::meta::attribute::{Chromaticities, LineOrder, SampleType};
+use ::exr::meta::attribute::{Chromaticities, Compression, LineOrder, SampleType};
 use ::exr::meta::header::{Header, LayerAttributes};
 use std::io::Cursor;
 use std::path::Path;
@@ -142,6 +142,17 @@ fn header_end(file: &[u8]) -> Option<usize> {
 /// A file may claim at most this many bytes of pixels a byte of its own: twice what deflate can do at best.
 const MAX_EXPANSION: u64 = 2064;
 
+/// The compressions that are read. The exr crate's decoders of B44 and DWA overflow or allocate without bound on hostile
+/// files, which no check of the header can prevent.
+const COMPRESSIONS: [Compression; 6] = [
+    Compression::Uncompressed,
+    Compression::RLE,
+    Compression::ZIP1,
+    Compression::ZIP16,
+    Compression::PIZ,
+    Compression::PXR24,
+];
+
 /// Reads the colour of an EXR file: channels `R`, `G`, `B`, or `Y` for grey, in 16- or 32-bit float, in any order, from
 /// the first part that has them. Other channels are passed over.
 ///
@@ -157,7 +168,8 @@ pub fn read_exr(path: &Path) -> Result<Image> {
 ///
 /// # Errors
 /// [`Error::BadFile`] for a broken file or one that claims more pixels than [`MAX_SIDE`] squared or than its bytes could
-/// hold (checked before anything is allocated for them); [`Error::Unsupported`] for deep or subsampled pixels.
+/// hold (checked before anything is allocated for them); [`Error::Unsupported`] for deep or subsampled pixels and for B44 and DWA
+/// compression.
 pub fn decode_exr(name: &str, bytes: &[u8]) -> Result<Image> {
     let bad = |place: &str, what: String| Error::bad_file(name, place, what);
     let library = |place: &str, error: ::exr::error::Error| match error {
@@ -174,6 +186,12 @@ pub fn decode_exr(name: &str, bytes: &[u8]) -> Result<Image> {
         let Vec2(width, height) = header.layer_size;
         if width == 0 || height == 0 || width.max(height) > MAX_SIDE as usize {
             return Err(bad("dataWindow", format!("{width}x{height} is not within 1x1 and {MAX_SIDE}x{MAX_SIDE}")));
+        }
+        if !COMPRESSIONS.contains(&header.compression) {
+            return Err(Error::Unsupported {
+                file: name.to_owned(),
+                what: format!("compression {}", header.compression),
+            });
         }
         claimed = claimed.saturating_add((width * height) as u64 * header.channels.bytes_per_pixel as u64);
     }
