@@ -10,6 +10,9 @@ pub mod environment;
 pub mod flat;
 pub mod gltf;
 pub mod gpu_types;
+pub mod octahedral;
+pub mod random;
+pub mod shapes;
 
 pub use flat::FlatScene;
 
