@@ -1,1 +1,109 @@
-fn main() {}
+//! Makes the shader table: every pass under `shaders/` flattened, parsed, validated and reflected.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+#[path = "src/gpu/binding_kind.rs"]
+mod binding_kind;
+#[path = "src/gpu/shader_source.rs"]
+mod shader_source;
+
+fn main() {
+    println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-changed=src/gpu/binding_kind.rs");
+    println!("cargo:rerun-if-changed=src/gpu/shader_source.rs");
+    println!("cargo:rerun-if-changed=shaders");
+    let root = PathBuf::from(std::env::var("CARGO_MANIFEST_DIR").expect("cargo sets it")).join("shaders");
+    let out = PathBuf::from(std::env::var("OUT_DIR").expect("cargo sets it"));
+    let wasm = std::env::var("CARGO_CFG_TARGET_ARCH").is_ok_and(|arch| arch == "wasm32");
+    let mut passes = Vec::new();
+    collect(&root, &root, &mut passes);
+    passes.sort();
+    // The page carries no test kernels.
+    passes.retain(|file| !(wasm && file.starts_with("tests/")));
+
+    // A flat copy for other validators (Tint), beside the build rather than in it. Native only.
+    let copies = (!wasm).then(|| out.ancestors().nth(4).expect("target/PROFILE/build/NAME/out").join("shaders"));
+    if let Some(copies) = &copies {
+        let _ = std::fs::remove_dir_all(copies);
+        std::fs::create_dir_all(copies).expect("target folder is writable");
+    }
+
+    let mut table = String::new();
+    let mut names = Vec::new();
+    let mut errors = Vec::new();
+    for file in &passes {
+        match shader_source::flatten(&root, file).and_then(|f| shader_source::reflect(&f).map(|r| (f, r))) {
+            Ok((flattened, reflection)) => {
+                let id = file.trim_end_matches(".wgsl").trim_start_matches("techniques/").to_owned();
+                let flat_name = format!("{}.wgsl", id.replace('/', "."));
+                std::fs::write(out.join(&flat_name), &flattened.text).expect("OUT_DIR is writable");
+                if let Some(copies) = &copies {
+                    std::fs::write(copies.join(&flat_name), &flattened.text).expect("target folder is writable");
+                }
+                let name = id.replace(['/', '-'], "_").to_uppercase();
+                write_entry(&mut table, &name, &id, file, &flat_name, &flattened, &reflection);
+                names.push(name);
+            }
+            Err(error) => errors.push(error),
+        }
+    }
+    for error in &errors {
+        for line in error.lines() {
+            println!("cargo:warning=shaders/{line}");
+        }
+    }
+    assert!(errors.is_empty(), "{} shader(s) failed:\n{}", errors.len(), errors.join("\n"));
+    writeln!(table, "/// Every pass.\npub static ALL: &[&Shader] = &[{}];", list(&names, |n| format!("&{n}"))).unwrap();
+    std::fs::write(out.join("shaders.rs"), table).expect("OUT_DIR is writable");
+}
+
+/// Every file with an entry point, relative to `root`.
+fn collect(root: &Path, folder: &Path, passes: &mut Vec<String>) {
+    for entry in std::fs::read_dir(folder).expect("shaders/ is readable") {
+        let path = entry.expect("shaders/ is readable").path();
+        if path.is_dir() {
+            collect(root, &path, passes);
+        } else if path.extension().is_some_and(|e| e == "wgsl") {
+            let text = std::fs::read_to_string(&path).expect("shaders are UTF-8");
+            if text.lines().any(|l| l.starts_with("@compute") || l.starts_with("@vertex")) {
+                let file = path.strip_prefix(root).expect("below root");
+                passes.push(file.to_str().expect("shader names are UTF-8").replace('\\', "/"));
+            }
+        }
+    }
+}
+
+fn list<T>(items: &[T], show: impl Fn(&T) -> String) -> String {
+    items.iter().map(show).collect::<Vec<_>>().join(", ")
+}
+
+fn write_entry(
+    table: &mut String,
+    name: &str,
+    id: &str,
+    file: &str,
+    flat_name: &str,
+    flattened: &shader_source::Flattened,
+    reflection: &shader_source::Reflection,
+) {
+    let bindings = list(&reflection.bindings, |b| {
+        format!(
+            "Binding {{ name: {:?}, group: {}, index: {}, kind: BindingKind::{:?} }}",
+            b.name, b.group, b.index, b.kind
+        )
+    });
+    let structs = list(&reflection.structs, |s| {
+        let fields = list(&s.fields, |(name, offset)| format!("({name:?}, {offset})"));
+        format!("StructLayout {{ name: {:?}, size: {}, fields: &[{fields}] }}", s.name, s.size)
+    });
+    let segments = list(&flattened.segments, |s| format!("({}, {:?}, {})", s.line, s.file, s.file_line));
+    writeln!(
+        table,
+        "/// `shaders/{file}`\npub static {name}: Shader = Shader {{\n    id: {id:?},\n    file: {file:?},\n    \
+         source: include_str!(concat!(env!(\"OUT_DIR\"), \"/{flat_name}\")),\n    workgroup_size: {:?},\n    \
+         bindings: &[{bindings}],\n    structs: &[{structs}],\n    segments: &[{segments}],\n}};",
+        reflection.workgroup_size
+    )
+    .unwrap();
+}

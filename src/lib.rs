@@ -1,8 +1,41 @@
-//! ReSTIR in the browser and headless: one WGSL source, five nouns.
+//! ReSTIR in the browser and headless: one WGSL source, five nouns, arrows one way.
 //!
-//! [`scene::Scene`] -> [`scene::FlatScene`] -> `GpuScene` -> `Technique` -> `Film`.
+//! [`Scene`] -> [`FlatScene`] -> [`gpu_scene::GpuScene`] -> [`techniques::Technique`] -> [`film::Film`], and a
+//! [`Renderer`] that holds one of each.
 
 pub mod error;
+pub mod film;
+pub mod frame;
+pub mod gpu;
+pub mod gpu_scene;
+pub mod output;
+pub mod params;
+pub mod renderer;
 pub mod scene;
+pub mod techniques;
+#[cfg(target_arch = "wasm32")]
+mod web;
 
 pub use error::{Error, Result};
+pub use gpu::{Gpu, GpuOptions};
+pub use output::Image;
+pub use renderer::Renderer;
+pub use scene::{FlatScene, Scene};
+
+/// Every struct that has a WGSL twin of the same name. A test compares each with what naga says of the twin, and fails
+/// for one that no shader declares.
+pub fn gpu_layouts() -> Vec<scene::gpu_types::Layout> {
+    use scene::gpu_types as types;
+    let shared = [
+        types::BvhNode::LAYOUT,
+        types::Triangle::LAYOUT,
+        types::TextureSlot::LAYOUT,
+        types::Material::LAYOUT,
+        types::Light::LAYOUT,
+        types::CameraView::LAYOUT,
+        frame::Frame::LAYOUT,
+        film::FilmUniforms::LAYOUT,
+        film::Counters::LAYOUT,
+    ];
+    shared.into_iter().chain(techniques::ALL.iter().flat_map(|info| info.layouts.iter().copied())).collect()
+}

@@ -7,9 +7,16 @@ pub mod alias;
 pub mod builtin;
 pub mod bvh;
 pub mod environment;
+#[cfg(not(target_arch = "wasm32"))]
+mod files;
 pub mod flat;
 pub mod gltf;
 pub mod gpu_types;
+pub mod intersect;
+pub mod octahedral;
+pub mod random;
+pub mod shapes;
+pub mod tangents;
 
 pub use flat::FlatScene;
 

@@ -1,0 +1,111 @@
+// Group 0: the scene, the cameras and the frame. Every struct here has a Rust twin of the same name
+// (src/scene/gpu_types.rs, src/frame.rs) and a test compares their layouts.
+#include "lib/math.wgsl"
+
+struct CameraView {
+    world_to_clip: mat4x4f,
+    position: vec3f,
+    orthographic: u32,
+    right: vec3f, // half the picture's width
+    padding_0: f32,
+    up: vec3f, // half the picture's height
+    padding_1: f32,
+    forward: vec3f,
+    padding_2: f32,
+}
+
+struct Frame {
+    camera: CameraView,
+    previous_camera: CameraView,
+    size: vec2u, // pixels
+    index: u32, // frames since the last reset
+    seed: u32,
+    max_depth: u32, // scattering events: 1 is direct light only
+    mis_heuristic: u32, // MIS_BALANCE or MIS_POWER
+    roulette_start: u32, // scattering events before Russian roulette
+    roulette_minimum: f32, // q_min
+    roulette_threshold: f32, // T_threshold
+    light_count: u32,
+    environment_light: u32, // index of the environment in `lights`, or NONE
+    view: u32, // the technique's debug view; 0 is radiance
+    scene_radius: f32, // metres
+    history: u32, // 1 if the previous frame's buffers may be read
+    padding_0: u32,
+    padding_1: u32,
+}
+
+struct BvhNode {
+    min: vec3f,
+    first: u32, // inner: left child, the right one follows; leaf: first triangle
+    max: vec3f,
+    count: u32, // 0: inner
+}
+
+struct Triangle {
+    p0: vec3f,
+    material: u32,
+    p1: vec3f,
+    light: u32,
+    p2: vec3f,
+    instance: u32,
+    uv_a: vec4f,
+    uv_b: vec4f,
+    uv_c: vec4f,
+    normal_0: u32,
+    normal_1: u32,
+    normal_2: u32,
+    tangents: u32,
+    color_0: u32,
+    color_1: u32,
+    color_2: u32,
+    flags: u32,
+}
+
+struct TextureSlot {
+    row_u: vec3f,
+    flags: u32,
+    row_v: vec3f,
+    layer: u32,
+    x: u32,
+    y: u32,
+    width: u32, // 0: no texture
+    height: u32,
+}
+
+struct Material {
+    base_color: vec4f,
+    emissive: vec3f,
+    metallic: f32,
+    roughness: f32,
+    normal_scale: f32,
+    alpha_cutoff: f32,
+    double_sided: u32,
+    base_color_texture: TextureSlot,
+    metallic_roughness_texture: TextureSlot,
+    normal_texture: TextureSlot,
+    emissive_texture: TextureSlot,
+}
+
+struct Light {
+    position: vec3f,
+    kind: u32,
+    previous_position: vec3f,
+    triangle: u32,
+    direction: vec3f,
+    range: f32,
+    intensity: vec3f,
+    cos_outer: f32,
+    cos_inner: f32,
+    pmf: f32, // p(light)
+    alias_threshold: f32,
+    alias_light: u32,
+}
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> nodes: array<BvhNode>;
+@group(0) @binding(2) var<storage, read> triangles: array<Triangle>;
+@group(0) @binding(3) var<storage, read> materials: array<Material>;
+@group(0) @binding(4) var<storage, read> lights: array<Light>;
+@group(0) @binding(5) var atlas: texture_2d_array<f32>;
+@group(0) @binding(6) var environment_radiance: texture_2d<f32>;
+@group(0) @binding(7) var environment_alias: texture_2d<u32>;

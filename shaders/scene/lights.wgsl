@@ -1,0 +1,130 @@
+// The light table: choosing a light and a point on it, and what such a sample sends to a surface.
+//
+// A sample lives in its light's own measure: area for an emissive triangle, solid angle for the environment, and a
+// point mass for point, spot and directional lights. `LightContribution.value` is the integrand's light part in that
+// measure, so that value / pdf is an estimate whatever the kind.
+#include "scene/surface.wgsl"
+#include "scene/environment.wgsl"
+#include "lib/reservoir.wgsl"
+#include "lib/rng.wgsl"
+
+const LIGHT_TRIANGLE = 0u;
+const LIGHT_POINT = 1u;
+const LIGHT_SPOT = 2u;
+const LIGHT_DIRECTIONAL = 3u;
+const LIGHT_ENVIRONMENT = 4u;
+
+struct LightContribution {
+    direction: vec3f, // unit, from the surface to the light
+    distance: f32, // how far a shadow ray must be free
+    value: vec3f, // unshadowed incident radiance per unit of the sample's measure, geometry term included
+    solid_angle_jacobian: f32, // converts a density in the sample's measure to solid angle; 0 for a point mass
+}
+
+// The point of a light sample on its triangle, in barycentrics.
+fn light_sample_barycentrics(sample: LightSample) -> vec2f {
+    return sample_triangle(unpack_point(sample.point));
+}
+
+fn environment_sample_direction(sample: LightSample) -> vec3f {
+    return octahedral_decode(unpack_point(sample.point) * 2.0 - 1.0);
+}
+
+// Draws a light by its probability and a point on it.
+fn light_sample(rng: ptr<function, Rng>) -> LightSample {
+    let u = random_4(rng);
+    var light = min(u32(u.x * f32(frame.light_count)), frame.light_count - 1u);
+    if u.y >= lights[light].alias_threshold {
+        light = lights[light].alias_light;
+    }
+    if light == frame.environment_light {
+        let direction = environment_sample(random_4(rng));
+        return LightSample(light, pack_point(octahedral_encode(direction) * 0.5 + 0.5));
+    }
+    return LightSample(light, pack_point(u.zw));
+}
+
+fn triangle_area(triangle: u32) -> f32 {
+    return 0.5 * length(triangle_normal(triangle));
+}
+
+// Density of `light_sample` in the sample's own measure.
+fn light_sample_pdf(sample: LightSample) -> f32 {
+    let pmf = lights[sample.light].pmf;
+    switch lights[sample.light].kind {
+        case LIGHT_TRIANGLE: { return pmf / triangle_area(lights[sample.light].triangle); }
+        case LIGHT_ENVIRONMENT: { return pmf * environment_pdf(environment_sample_direction(sample)); }
+        default: { return pmf; }
+    }
+}
+
+// Density per solid angle with which `light_sample` would have drawn the hit that a BRDF ray made on light `light`.
+fn light_hit_pdf(light: u32, triangle: u32, direction: vec3f, distance: f32) -> f32 {
+    let scaled_normal = triangle_normal(triangle);
+    let cosine_times_twice_area = abs(dot(scaled_normal, direction));
+    if cosine_times_twice_area <= 0.0 {
+        return 0.0;
+    }
+    return lights[light].pmf * 2.0 * distance * distance / cosine_times_twice_area;
+}
+
+fn environment_hit_pdf(direction: vec3f) -> f32 {
+    return lights[frame.environment_light].pmf * environment_pdf(direction);
+}
+
+// KHR_lights_punctual: inverse square, windowed by the range where one is given.
+fn distance_attenuation(light: u32, distance: f32) -> f32 {
+    let range = lights[light].range;
+    var window = 1.0;
+    if range > 0.0 {
+        let x = distance / range;
+        window = clamp(1.0 - x * x * x * x, 0.0, 1.0);
+    }
+    return window / max(distance * distance, 1e-12);
+}
+
+// KHR_lights_punctual: linear in the cosine between the cones, squared.
+fn cone_attenuation(light: u32, direction: vec3f) -> f32 {
+    let cosine = dot(lights[light].direction, -direction);
+    let scale = 1.0 / max(0.001, lights[light].cos_inner - lights[light].cos_outer);
+    return square(clamp((cosine - lights[light].cos_outer) * scale, 0.0, 1.0));
+}
+
+// What a light sample sends to a point, unshadowed. `previous` asks for the light as it was in the previous frame.
+fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> LightContribution {
+    let light = sample.light;
+    let kind = lights[light].kind;
+    if kind == LIGHT_TRIANGLE {
+        let triangle = lights[light].triangle;
+        let uv = light_sample_barycentrics(sample);
+        let to_light = triangle_point(triangle, uv) - position;
+        let distance_2 = dot(to_light, to_light);
+        let distance = sqrt(distance_2);
+        let direction = to_light / max(distance, 1e-20);
+        var cosine = dot(normalize(triangle_normal(triangle)), -direction);
+        if (triangles[triangle].flags & TRIANGLE_DOUBLE_SIDED) != 0u {
+            cosine = abs(cosine);
+        }
+        if cosine <= 0.0 || distance_2 <= 1e-12 {
+            return LightContribution(direction, distance, vec3f(0.0), 0.0);
+        }
+        // Cut short by a ten-thousandth, so that the light does not shadow itself.
+        return LightContribution(direction, distance * 0.9999, emitted_radiance(triangle, uv) * (cosine / distance_2),
+            distance_2 / cosine);
+    }
+    if kind == LIGHT_ENVIRONMENT {
+        let direction = environment_sample_direction(sample);
+        return LightContribution(direction, ENVIRONMENT_DISTANCE, environment_evaluate(direction), 1.0);
+    }
+    if kind == LIGHT_DIRECTIONAL {
+        return LightContribution(-lights[light].direction, ENVIRONMENT_DISTANCE, lights[light].intensity, 0.0);
+    }
+    let to_light = select(lights[light].position, lights[light].previous_position, previous) - position;
+    let distance = length(to_light);
+    let direction = to_light / max(distance, 1e-20);
+    var attenuation = distance_attenuation(light, distance);
+    if kind == LIGHT_SPOT {
+        attenuation *= cone_attenuation(light, direction);
+    }
+    return LightContribution(direction, distance, lights[light].intensity * attenuation, 0.0);
+}

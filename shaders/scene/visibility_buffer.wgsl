@@ -1,0 +1,17 @@
+// The visibility buffer: what each pixel's primary ray hit, as (instance, triangle, barycentrics). Surfaces are rebuilt
+// from it where they are needed, this frame's and the previous frame's alike, instead of being kept in a fat G-buffer.
+#include "scene/camera.wgsl"
+#include "scene/surface.wgsl"
+
+@group(1) @binding(0) var visibility: texture_2d<u32>;
+
+fn pixel_has_surface(pixel: vec2u) -> bool {
+    return textureLoad(visibility, pixel, 0).x != NONE;
+}
+
+// The surface at a pixel that has one.
+fn load_pixel(pixel: vec2u) -> Surface {
+    let v = textureLoad(visibility, pixel, 0);
+    let uv = bitcast<vec2f>(v.zw);
+    return load_surface(v.y, uv, direction_to_camera(frame.camera, triangle_point(v.y, uv)));
+}

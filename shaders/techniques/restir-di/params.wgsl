@@ -1,0 +1,38 @@
+// The switches of restir-di, declared in src/techniques/restir_di.rs.
+
+struct RestirDiParams {
+    light_samples: u32,
+    visibility_reuse: u32,
+    temporal_reuse: u32,
+    history_cap: f32,
+    temporal_position_threshold: f32,
+    temporal_normal_threshold: f32,
+    temporal_albedo_threshold: f32,
+    spatial_reuse: u32,
+    spatial_iterations: u32,
+    spatial_neighbors: u32,
+    spatial_radius: f32,
+    spatial_depth_threshold: f32,
+    spatial_normal_threshold: f32,
+    reservoir_size: u32,
+    bias_correction: u32,
+    indirect: u32,
+}
+
+const BIAS_CORRECTION_NONE = 0u; // m = c / sum c
+const BIAS_CORRECTION_Z = 1u; // the same over the pixels whose target function is not zero
+const BIAS_CORRECTION_MIS = 2u; // balance heuristic over target functions
+const BIAS_CORRECTION_MIS_VISIBILITY = 3u; // the same with visibility: unbiased
+
+const MAXIMUM_RESERVOIR_SIZE = 4u;
+
+@group(1) @binding(3) var<uniform> params: RestirDiParams;
+
+// Where a pixel's reservoir of a slot lies in a reservoir buffer.
+fn reservoir_index(pixel: vec2u, slot: u32) -> u32 {
+    return (pixel.y * frame.size.x + pixel.x) * slot_count() + slot;
+}
+
+fn slot_count() -> u32 {
+    return select(1u, MAXIMUM_RESERVOIR_SIZE, params.reservoir_size == 1u);
+}

@@ -1,0 +1,69 @@
+// Shading: each reservoir's sample, with a shadow ray of its own, plus what the surface emits and the indirect light.
+// One invocation: one pixel. Reads the visibility buffer, the final reservoirs and the indirect radiance. Writes
+// radiance, or a debug view.
+// Source: Bitterli et al. 2020, Algorithm 5, lines 20 to 22; thesis 001, section 5.5 (several slots are averaged).
+#include "scene/visibility_buffer.wgsl"
+#include "scene/counters.wgsl"
+#include "techniques/common/resampling.wgsl"
+#include "techniques/restir-di/params.wgsl"
+
+@group(1) @binding(2) var radiance_out: texture_storage_2d<rgba32float, write>;
+@group(1) @binding(4) var<storage, read> reservoirs: array<Reservoir>;
+@group(1) @binding(5) var indirect_radiance: texture_2d<f32>;
+
+const VIEW_DIRECT = 1u;
+const VIEW_INDIRECT = 2u;
+const VIEW_CONTRIBUTION_WEIGHT = 3u;
+const VIEW_CONFIDENCE_WEIGHT = 4u;
+const VIEW_LIGHT = 5u;
+
+// A colour a light can be told by.
+fn light_color(light: u32) -> vec3f {
+    if light == NONE {
+        return vec3f(0.0);
+    }
+    return vec3f(pcg4d(vec4u(light, 1u, 2u, 3u)).xyz >> vec3u(8u)) * 5.9604645e-8;
+}
+
+fn indirect_light(pixel: vec2u) -> vec3f {
+    if params.indirect == 0u {
+        return vec3f(0.0);
+    }
+    return textureLoad(indirect_radiance, pixel, 0).rgb;
+}
+
+fn pixel_radiance(pixel: vec2u) -> vec3f {
+    if !pixel_has_surface(pixel) {
+        return select(vec3f(0.0), environment_evaluate(primary_ray(pixel).direction), frame.view == 0u);
+    }
+    let surface = load_pixel(pixel);
+    let slots = slot_count();
+    let first = reservoirs[reservoir_index(pixel, 0u)];
+    switch frame.view {
+        case VIEW_INDIRECT: { return indirect_light(pixel); }
+        // W times p-hat is the estimate itself up to visibility, hence dimensionless enough to look at.
+        case VIEW_CONTRIBUTION_WEIGHT: {
+            return vec3f(first.unbiased_contribution_weight * target_function(surface, reservoir_sample(first), false));
+        }
+        case VIEW_CONFIDENCE_WEIGHT: { return vec3f(first.confidence_weight / (params.history_cap + 1.0)); }
+        case VIEW_LIGHT: { return light_color(first.light); }
+        default: {}
+    }
+    var direct = vec3f(0.0);
+    for (var slot = 0u; slot < slots; slot += 1u) {
+        direct += shade_reservoir(surface, reservoirs[reservoir_index(pixel, slot)]);
+    }
+    direct /= f32(slots);
+    if frame.view == VIEW_DIRECT {
+        return direct;
+    }
+    return surface.emission + direct + indirect_light(pixel);
+}
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) pixel: vec3u, @builtin(local_invocation_index) local_index: u32) {
+    if all(pixel.xy < frame.size) {
+        textureStore(radiance_out, pixel.xy, vec4f(pixel_radiance(pixel.xy), 1.0));
+    }
+    flush_ray_count(local_index);
+}

@@ -1,0 +1,87 @@
+// Temporal reuse: the reservoir of the same surface point in the previous frame joins this frame's.
+// One invocation: one pixel. Reads both visibility buffers, this frame's initial reservoirs and the previous frame's
+// final ones. Writes the combined reservoirs.
+// Source: Bitterli et al. 2020, Algorithm 5, lines 8 to 12; thesis 001, section 5.3.1 (rejection by position, normal and
+// albedo); history cap of Bitterli et al. 2020, section 4.2.
+#include "scene/visibility_buffer.wgsl"
+#include "scene/counters.wgsl"
+#include "techniques/restir-di/combine.wgsl"
+
+@group(1) @binding(2) var previous_visibility: texture_2d<u32>;
+@group(1) @binding(4) var<storage, read> reservoirs: array<Reservoir>;
+@group(1) @binding(5) var<storage, read> reservoirs_previous: array<Reservoir>;
+@group(1) @binding(6) var<storage, read_write> reservoirs_out: array<Reservoir>;
+
+// The previous frame's pixel that saw this surface, or (-1, -1).
+fn reproject(surface: Surface) -> vec2i {
+    let film = project(frame.previous_camera, surface.position);
+    if any(film < vec2f(0.0)) || any(film >= vec2f(frame.size)) {
+        return vec2i(-1);
+    }
+    return vec2i(film);
+}
+
+fn is_same_surface(surface: Surface, previous: Surface) -> bool {
+    let distance = length(surface.position - frame.camera.position);
+    let albedo_difference = abs(surface.brdf.base_color - previous.brdf.base_color);
+    return length(surface.position - previous.position) <= params.temporal_position_threshold * distance
+        && dot(surface.basis.normal, previous.basis.normal) >= params.temporal_normal_threshold
+        && max(albedo_difference.r, max(albedo_difference.g, albedo_difference.b)) <= params.temporal_albedo_threshold;
+}
+
+fn combine_slot(pixel: vec2u, previous_pixel: vec2u, slot: u32, surface: Surface, previous: Surface,
+    rng: ptr<function, Rng>) {
+    let current = reservoirs[reservoir_index(pixel, slot)];
+    let history = reservoirs_previous[reservoir_index(previous_pixel, slot)];
+    let history_confidence = min(history.confidence_weight, params.history_cap * current.confidence_weight);
+    let u = random_2(rng);
+    var combination = combination_empty();
+    combination_offer(&combination, surface, current, 0u, current.confidence_weight, u.x);
+    combination_offer(&combination, surface, history, 1u, history_confidence, u.y);
+    combination_correct(&combination, surface, 0u, current.confidence_weight, false);
+    combination_correct(&combination, previous, 1u, history_confidence, true);
+    reservoirs_out[reservoir_index(pixel, slot)] = combination_finish(combination, surface);
+}
+
+fn keep(pixel: vec2u) {
+    for (var slot = 0u; slot < slot_count(); slot += 1u) {
+        reservoirs_out[reservoir_index(pixel, slot)] = reservoirs[reservoir_index(pixel, slot)];
+    }
+}
+
+fn reuse_pixel(pixel: vec2u) {
+    if frame.history == 0u || !pixel_has_surface(pixel) {
+        keep(pixel);
+        return;
+    }
+    let surface = load_pixel(pixel);
+    let reprojected = reproject(surface);
+    if reprojected.x < 0 {
+        keep(pixel);
+        return;
+    }
+    let previous_pixel = vec2u(reprojected);
+    let seen = textureLoad(previous_visibility, previous_pixel, 0);
+    if seen.x == NONE {
+        keep(pixel);
+        return;
+    }
+    let uv = bitcast<vec2f>(seen.zw);
+    let previous = load_surface(seen.y, uv, direction_to_camera(frame.previous_camera, triangle_point(seen.y, uv)));
+    if !is_same_surface(surface, previous) {
+        keep(pixel);
+        return;
+    }
+    var rng = rng_new(pixel, frame.index, frame.seed, STREAM_TEMPORAL);
+    for (var slot = 0u; slot < slot_count(); slot += 1u) {
+        combine_slot(pixel, previous_pixel, slot, surface, previous, &rng);
+    }
+}
+
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) pixel: vec3u, @builtin(local_invocation_index) local_index: u32) {
+    if all(pixel.xy < frame.size) {
+        reuse_pixel(pixel.xy);
+    }
+    flush_ray_count(local_index);
+}

@@ -1,0 +1,160 @@
+//! The film: accumulation, exposure, tone mapping, what is displayed, and counters. It knows nothing of how the radiance
+//! was made.
+
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::gpu::recorder::Recorder;
+use crate::gpu::shader::table;
+use crate::gpu_struct;
+use crate::params::FilmParams;
+use glam::UVec2;
+
+#[cfg(target_arch = "wasm32")]
+pub mod blit;
+
+gpu_struct! {
+/// The film passes' uniform, as `shaders/film/film.wgsl` declares it.
+pub struct FilmUniforms {
+    /// Picture size in pixels.
+    pub size: UVec2,
+    /// Index of the tone map.
+    pub tone_map: u32,
+    /// 1 for automatic exposure.
+    pub automatic_exposure: u32,
+    /// EV.
+    pub exposure: f32,
+    /// 1: show values as they are.
+    pub raw: u32,
+    /// Unused.
+    pub padding_0: u32,
+    /// Unused.
+    pub padding_1: u32,
+}
+}
+
+gpu_struct! {
+/// What passes count during one frame.
+pub struct Counters {
+    /// Rays traced.
+    pub rays: u32,
+    /// Pixels whose radiance was not a number.
+    pub nan: u32,
+    /// Pixels whose radiance was infinite.
+    pub infinite: u32,
+    /// Unused.
+    pub padding: u32,
+}
+}
+
+/// The film's buffers for one picture size.
+#[derive(Debug)]
+pub struct Film {
+    size: UVec2,
+    uniforms: wgpu::Buffer,
+    /// What the technique writes: linear radiance, `Rgba32Float`.
+    pub radiance: wgpu::TextureView,
+    /// Sum (rgb) and sample count (a) of each pixel.
+    pub accumulation: wgpu::Buffer,
+    exposure_state: wgpu::Buffer,
+    /// Tone-mapped sRGB RGBA8, one `u32` a pixel.
+    pub display: wgpu::Buffer,
+    /// [`Counters`] of the frame being recorded, then of the last one.
+    pub counters: wgpu::Buffer,
+}
+
+impl Film {
+    /// A film of `size` pixels.
+    ///
+    /// # Errors
+    /// `BAD_VALUE` for an empty picture, `LIMIT` for one the device cannot hold.
+    pub fn new(gpu: &Gpu, size: UVec2) -> Result<Self> {
+        if size.min_element() == 0 {
+            return Err(Error::bad_value("size", format!("{}x{} has no pixels", size.x, size.y)));
+        }
+        let side = gpu.device.limits().max_texture_dimension_2d;
+        if size.max_element() > side {
+            return Err(Error::Limit {
+                what: format!("a picture of {}x{}", size.x, size.y),
+                wanted: size.max_element().into(),
+                had: side.into(),
+                unit: "pixels a side",
+            });
+        }
+        let pixels = u64::from(size.x) * u64::from(size.y);
+        Ok(Film {
+            size,
+            uniforms: gpu.uniform("film", std::mem::size_of::<FilmUniforms>() as u64),
+            radiance: gpu.texture("radiance", size, wgpu::TextureFormat::Rgba32Float),
+            accumulation: gpu.storage(&format!("accumulation at {}x{}", size.x, size.y), pixels * 16)?,
+            exposure_state: gpu.storage("exposure", 16)?,
+            display: gpu.storage("display", pixels * 4)?,
+            counters: gpu.storage("counters", std::mem::size_of::<Counters>() as u64)?,
+        })
+    }
+
+    /// Picture size in pixels.
+    pub fn size(&self) -> UVec2 {
+        self.size
+    }
+
+    /// Uploads how the picture is shown; `raw` shows values as they are.
+    pub fn prepare(&self, gpu: &Gpu, params: &FilmParams, raw: bool) {
+        let uniforms = FilmUniforms {
+            size: self.size,
+            tone_map: params.tone_map,
+            automatic_exposure: params.exposure_mode,
+            exposure: params.exposure,
+            raw: raw.into(),
+            padding_0: 0,
+            padding_1: 0,
+        };
+        gpu.queue.write_buffer(&self.uniforms, 0, bytemuck::bytes_of(&uniforms));
+    }
+
+    /// Binds what techniques write to and count in.
+    pub fn share<'a>(&'a self, recorder: &mut Recorder<'a>) {
+        recorder.share("film", &self.uniforms);
+        recorder.share("radiance_out", &self.radiance);
+        recorder.share("counters", &self.counters);
+    }
+
+    /// Adds the frame's radiance; with `restart`, what was there before is dropped first.
+    ///
+    /// # Errors
+    /// `SHADER` if a pass is bound wrongly.
+    pub fn record_accumulate(&self, recorder: &mut Recorder<'_>, restart: bool) -> Result<()> {
+        if restart {
+            recorder.encoder.clear_buffer(&self.accumulation, 0, None);
+        }
+        recorder
+            .pass(&table::FILM_ACCUMULATE)
+            .bind("radiance", &self.radiance)
+            .bind("accumulation", &self.accumulation)
+            .dispatch_over(self.size)
+    }
+
+    /// Brings the display buffer up to date.
+    ///
+    /// # Errors
+    /// `SHADER` if a pass is bound wrongly.
+    pub fn record_display(&self, recorder: &mut Recorder<'_>, params: &FilmParams) -> Result<()> {
+        if params.exposure_mode == 1 {
+            recorder
+                .pass(&table::FILM_EXPOSURE)
+                .bind("accumulation", &self.accumulation)
+                .bind("exposure_state", &self.exposure_state)
+                .dispatch([1, 1, 1])?;
+        }
+        recorder
+            .pass(&table::FILM_DISPLAY)
+            .bind("accumulation", &self.accumulation)
+            .bind("exposure_state", &self.exposure_state)
+            .bind("display", &self.display)
+            .dispatch_over(self.size)
+    }
+
+    /// The uniform, for passes outside the recorder.
+    pub fn uniforms(&self) -> &wgpu::Buffer {
+        &self.uniforms
+    }
+}

@@ -1,0 +1,235 @@
+//! The device: adapter and limits, device loss, pipelines, buffers, textures and read-back.
+
+pub mod readback;
+pub mod recorder;
+#[cfg(all(debug_assertions, not(target_arch = "wasm32")))]
+pub mod reload;
+pub mod shader;
+
+pub mod binding_kind;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod shader_source;
+
+use crate::error::{Error, Result};
+use shader::{Pipeline, Shader};
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex};
+
+/// How to choose a device.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct GpuOptions {
+    /// Stay within WebGPU's default limits even where the adapter has more.
+    pub default_limits: bool,
+}
+
+/// A device and queue with the pipelines made on it. A clone is another handle on the same device.
+#[derive(Debug, Clone)]
+pub struct Gpu {
+    /// The device.
+    pub device: wgpu::Device,
+    /// Its queue.
+    pub queue: wgpu::Queue,
+    /// Whether compute passes can be timed.
+    pub has_timestamps: bool,
+    adapter: wgpu::AdapterInfo,
+    failure: Arc<Mutex<Option<String>>>,
+    pipelines: Arc<Mutex<HashMap<&'static str, Pipeline>>>,
+    #[cfg(all(debug_assertions, not(target_arch = "wasm32")))]
+    reloader: Arc<Mutex<Option<reload::Reloader>>>,
+}
+
+/// The default instance: WebGPU on the web, Vulkan elsewhere.
+pub fn instance() -> wgpu::Instance {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::BROWSER_WEBGPU;
+    wgpu::Instance::new(descriptor)
+}
+
+impl Gpu {
+    /// A device without a window: the first GPU, or a software adapter where there is none.
+    ///
+    /// # Errors
+    /// `NO_ADAPTER` if there is no Vulkan driver at all, with what to install.
+    pub async fn headless(options: &GpuOptions) -> Result<Self> {
+        Self::from_instance(&instance(), None, options).await
+    }
+
+    /// A device of `instance` that can present to `surface`, if one is given.
+    ///
+    /// # Errors
+    /// `NO_ADAPTER` if no adapter or no device can be had.
+    pub async fn from_instance(
+        instance: &wgpu::Instance,
+        surface: Option<&wgpu::Surface<'_>>,
+        options: &GpuOptions,
+    ) -> Result<Self> {
+        let adapter = instance
+            .request_adapter(&wgpu::RequestAdapterOptions {
+                power_preference: wgpu::PowerPreference::HighPerformance,
+                compatible_surface: surface,
+                ..Default::default()
+            })
+            .await
+            .map_err(|e| Error::NoAdapter(format!("{e}; a Vulkan driver is needed (Debian: mesa-vulkan-drivers)")))?;
+        let has_timestamps = adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY);
+        let mut limits = wgpu::Limits::default();
+        if !options.default_limits {
+            // Only the sizes of things: every shader is written for the default counts.
+            let have = adapter.limits();
+            limits.max_storage_buffer_binding_size = have.max_storage_buffer_binding_size;
+            limits.max_buffer_size = have.max_buffer_size;
+        }
+        let (device, queue) = adapter
+            .request_device(&wgpu::DeviceDescriptor {
+                label: Some("restir"),
+                required_features: if has_timestamps {
+                    wgpu::Features::TIMESTAMP_QUERY
+                } else {
+                    wgpu::Features::empty()
+                },
+                required_limits: limits,
+                ..Default::default()
+            })
+            .await
+            .map_err(|e| Error::NoAdapter(e.to_string()))?;
+        let failure = Arc::new(Mutex::new(None));
+        let keep_first = |slot: &Mutex<Option<String>>, what: String| {
+            if let Ok(mut slot) = slot.lock() {
+                slot.get_or_insert(what);
+            }
+        };
+        let on_error = failure.clone();
+        device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| keep_first(&on_error, e.to_string())));
+        let on_loss = failure.clone();
+        device.set_device_lost_callback(move |reason, message| {
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                keep_first(&on_loss, format!("the device was lost: {message}"));
+            }
+        });
+        Ok(Gpu {
+            device,
+            queue,
+            has_timestamps,
+            adapter: adapter.get_info(),
+            failure,
+            pipelines: Arc::default(),
+            #[cfg(all(debug_assertions, not(target_arch = "wasm32")))]
+            reloader: Arc::new(Mutex::new(reload::Reloader::of_source_tree())),
+        })
+    }
+
+    /// The adapter's name and kind, for reports.
+    pub fn adapter_name(&self) -> String {
+        let name = if self.adapter.name.is_empty() { "WebGPU adapter" } else { &self.adapter.name };
+        format!("{name} ({:?})", self.adapter.backend)
+    }
+
+    /// Whether the adapter computes on the CPU.
+    pub fn is_software(&self) -> bool {
+        self.adapter.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// The first error the device reported since it was made, if any.
+    ///
+    /// # Errors
+    /// `DEVICE` with the driver's or validator's words.
+    pub fn check(&self) -> Result<()> {
+        match self.failure.lock() {
+            Ok(slot) => slot.as_ref().map_or(Ok(()), |what| Err(Error::Device(what.clone()))),
+            Err(_) => Err(Error::Device("an error handler panicked".into())),
+        }
+    }
+
+    /// The compute pipeline of a pass, made on first use.
+    pub fn pipeline(&self, shader: &'static Shader) -> Pipeline {
+        let Ok(mut pipelines) = self.pipelines.lock() else {
+            return shader.compute_pipeline(&self.device, shader.source);
+        };
+        pipelines.entry(shader.id).or_insert_with(|| shader.compute_pipeline(&self.device, shader.source)).clone()
+    }
+
+    /// Replaces pipelines whose shader files have changed on disk. Returns one line for each that could not be
+    /// replaced and keeps its old pipeline. Native debug builds only; elsewhere nothing happens.
+    pub fn reload_shaders(&self) -> Vec<String> {
+        #[cfg(all(debug_assertions, not(target_arch = "wasm32")))]
+        if let (Ok(mut reloader), Ok(mut pipelines)) = (self.reloader.lock(), self.pipelines.lock())
+            && let Some(reloader) = reloader.as_mut()
+        {
+            return reloader.reload(&self.device, &mut pipelines);
+        }
+        Vec::new()
+    }
+
+    /// Reloads shaders from another folder than the one the program was built from.
+    #[cfg(all(debug_assertions, not(target_arch = "wasm32")))]
+    pub fn watch_shaders(&self, folder: &std::path::Path) {
+        if let Ok(mut reloader) = self.reloader.lock() {
+            *reloader = Some(reload::Reloader::new(folder));
+        }
+    }
+
+    /// Fails, with numbers, where a storage buffer of `size` bytes would not be allowed.
+    ///
+    /// # Errors
+    /// `LIMIT`.
+    pub fn check_storage(&self, what: &str, size: u64) -> Result<()> {
+        let limits = self.device.limits();
+        let had = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        if size > had {
+            return Err(Error::Limit { what: what.to_owned(), wanted: size, had, unit: "bytes in one buffer" });
+        }
+        Ok(())
+    }
+
+    /// A zeroed storage buffer of `size` bytes (at least 16) that can be copied from and to.
+    ///
+    /// # Errors
+    /// `LIMIT` if the device does not allow it.
+    pub fn storage(&self, label: &str, size: u64) -> Result<wgpu::Buffer> {
+        self.check_storage(label, size)?;
+        Ok(self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: size.max(16).next_multiple_of(4),
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        }))
+    }
+
+    /// A storage buffer that holds `data` (at least 16 bytes).
+    ///
+    /// # Errors
+    /// `LIMIT` if the device does not allow it.
+    pub fn storage_of<T: bytemuck::Pod>(&self, label: &str, data: &[T]) -> Result<wgpu::Buffer> {
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let buffer = self.storage(label, bytes.len() as u64)?;
+        self.queue.write_buffer(&buffer, 0, bytes);
+        Ok(buffer)
+    }
+
+    /// A uniform buffer of `size` bytes.
+    pub fn uniform(&self, label: &str, size: u64) -> wgpu::Buffer {
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    }
+
+    /// A 2D texture that passes write as a storage texture and read by `textureLoad`.
+    pub fn texture(&self, label: &str, size: glam::UVec2, format: wgpu::TextureFormat) -> wgpu::TextureView {
+        let texture = self.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: wgpu::TextureUsages::STORAGE_BINDING
+                | wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        texture.create_view(&wgpu::TextureViewDescriptor::default())
+    }
+}

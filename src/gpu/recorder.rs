@@ -1,0 +1,162 @@
+//! Recording a frame: a straight line of passes, each a compute pass of its own with a label and timestamps.
+
+use super::Gpu;
+use super::shader::{Resource, Shader};
+use crate::error::Result;
+use glam::UVec2;
+
+/// Most passes that can be timed in one frame; later ones run untimed.
+pub const MAXIMUM_TIMED_PASSES: u32 = 64;
+
+/// GPU time of one pass.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct PassTime {
+    /// The pass's shader id.
+    pub name: &'static str,
+    /// Milliseconds.
+    pub ms: f64,
+}
+
+/// The timestamp queries of one frame.
+#[derive(Debug, Clone)]
+pub struct Timer {
+    queries: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+    names: Vec<&'static str>,
+}
+
+impl Timer {
+    /// A timer, or nothing where the device cannot time passes.
+    pub fn new(gpu: &Gpu) -> Option<Self> {
+        gpu.has_timestamps.then(|| Timer {
+            queries: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("pass times"),
+                ty: wgpu::QueryType::Timestamp,
+                count: 2 * MAXIMUM_TIMED_PASSES,
+            }),
+            resolved: gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("pass times"),
+                size: u64::from(2 * MAXIMUM_TIMED_PASSES) * 8,
+                usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+                mapped_at_creation: false,
+            }),
+            names: Vec::new(),
+        })
+    }
+
+    /// Times of the last recorded frame.
+    ///
+    /// # Errors
+    /// `DEVICE` if they cannot be read back.
+    pub async fn read(&self, gpu: &Gpu) -> Result<Vec<PassTime>> {
+        if self.names.is_empty() {
+            return Ok(Vec::new());
+        }
+        let bytes = gpu.read_buffer(&self.resolved, self.names.len() as u64 * 16).await?;
+        let period = f64::from(gpu.queue.get_timestamp_period());
+        let tick = |i: usize| bytes.get(i * 8..i * 8 + 8).and_then(|b| b.try_into().ok()).map_or(0, u64::from_le_bytes);
+        Ok(self
+            .names
+            .iter()
+            .enumerate()
+            .map(|(i, name)| PassTime { name, ms: tick(2 * i + 1).saturating_sub(tick(2 * i)) as f64 * period * 1e-6 })
+            .collect())
+    }
+}
+
+/// Records passes. Resources shared by many passes are bound once, by name.
+pub struct Recorder<'a> {
+    gpu: &'a Gpu,
+    /// The encoder, for copies and clears.
+    pub encoder: wgpu::CommandEncoder,
+    timer: Option<&'a mut Timer>,
+    shared: Vec<(&'a str, Resource<'a>)>,
+}
+
+impl<'a> Recorder<'a> {
+    /// Starts a frame.
+    pub fn new(gpu: &'a Gpu, mut timer: Option<&'a mut Timer>) -> Self {
+        if let Some(timer) = timer.as_mut() {
+            timer.names.clear();
+        }
+        let encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
+        Recorder { gpu, encoder, timer, shared: Vec::new() }
+    }
+
+    /// Binds a resource for every later pass that asks for it by name.
+    pub fn share(&mut self, name: &'a str, resource: impl Into<Resource<'a>>) {
+        self.shared.push((name, resource.into()));
+    }
+
+    /// Starts describing a pass.
+    pub fn pass<'r>(&'r mut self, shader: &'static Shader) -> Pass<'r, 'a> {
+        let bound = self.shared.clone();
+        Pass { recorder: self, shader, bound }
+    }
+
+    /// Ends the frame and submits it.
+    pub fn submit(mut self) {
+        if let Some(timer) = self.timer
+            && !timer.names.is_empty()
+        {
+            self.encoder.resolve_query_set(&timer.queries, 0..2 * timer.names.len() as u32, &timer.resolved, 0);
+        }
+        self.gpu.queue.submit([self.encoder.finish()]);
+    }
+}
+
+/// One pass being described.
+pub struct Pass<'r, 'a> {
+    recorder: &'r mut Recorder<'a>,
+    shader: &'static Shader,
+    bound: Vec<(&'r str, Resource<'r>)>,
+}
+
+impl<'r> Pass<'r, '_> {
+    /// Binds a resource by the name the shader gives it.
+    #[must_use]
+    pub fn bind(mut self, name: &'r str, resource: impl Into<Resource<'r>>) -> Self {
+        self.bound.push((name, resource.into()));
+        self
+    }
+
+    /// Runs one invocation a pixel.
+    ///
+    /// # Errors
+    /// `SHADER` if something the shader needs was not bound.
+    pub fn dispatch_over(self, size: UVec2) -> Result<()> {
+        let [x, y, _] = self.shader.workgroup_size;
+        self.dispatch([size.x.div_ceil(x), size.y.div_ceil(y), 1])
+    }
+
+    /// Runs that many workgroups.
+    ///
+    /// # Errors
+    /// `SHADER` if something the shader needs was not bound.
+    pub fn dispatch(self, workgroups: [u32; 3]) -> Result<()> {
+        let Pass { recorder, shader, bound } = self;
+        let pipeline = recorder.gpu.pipeline(shader);
+        let groups = shader.bind_groups(recorder.gpu, &pipeline.groups, &bound)?;
+        let timestamp_writes = recorder.timer.as_mut().and_then(|timer| {
+            let index = timer.names.len() as u32;
+            (index < MAXIMUM_TIMED_PASSES).then(|| {
+                timer.names.push(shader.id);
+                wgpu::ComputePassTimestampWrites {
+                    query_set: &timer.queries,
+                    beginning_of_pass_write_index: Some(2 * index),
+                    end_of_pass_write_index: Some(2 * index + 1),
+                }
+            })
+        });
+        let mut pass = recorder
+            .encoder
+            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(shader.id), timestamp_writes });
+        pass.set_pipeline(&pipeline.pipeline);
+        for (index, group) in groups.iter().enumerate() {
+            pass.set_bind_group(index as u32, group, &[]);
+        }
+        let [x, y, z] = workgroups;
+        pass.dispatch_workgroups(x, y, z);
+        Ok(())
+    }
+}

@@ -1,0 +1,205 @@
+//! The shader table that `build.rs` generates, and pipelines made from it.
+
+pub use super::binding_kind::BindingKind;
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+
+/// One resource a pass reaches.
+#[derive(Debug, Clone, Copy)]
+pub struct Binding {
+    /// The WGSL variable's name, by which it is bound.
+    pub name: &'static str,
+    /// `@group`.
+    pub group: u32,
+    /// `@binding`.
+    pub index: u32,
+    /// What it is.
+    pub kind: BindingKind,
+}
+
+/// A WGSL struct as naga lays it out.
+#[derive(Debug, Clone, Copy)]
+pub struct StructLayout {
+    /// Its name.
+    pub name: &'static str,
+    /// Its size in bytes.
+    pub size: u32,
+    /// (field, byte offset).
+    pub fields: &'static [(&'static str, u32)],
+}
+
+/// One pass: its WGSL with includes in place, and what was read from it at build time.
+#[derive(Debug)]
+pub struct Shader {
+    /// `technique/pass`, `scene/pass` or `film/pass`.
+    pub id: &'static str,
+    /// The file, relative to `shaders/`.
+    pub file: &'static str,
+    /// Flattened WGSL.
+    pub source: &'static str,
+    /// `@workgroup_size`; zeros for a render pass.
+    pub workgroup_size: [u32; 3],
+    /// By group, then index.
+    pub bindings: &'static [Binding],
+    /// Every struct with a layout.
+    pub structs: &'static [StructLayout],
+    /// (first flattened line, file, line in file), sorted.
+    pub segments: &'static [(u32, &'static str, u32)],
+}
+
+/// The generated table.
+#[allow(missing_docs, reason = "generated")]
+pub mod table {
+    use super::{Binding, BindingKind, Shader, StructLayout};
+    include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+}
+
+/// A pipeline and the layouts its bind groups are made with.
+#[derive(Debug, Clone)]
+pub struct Pipeline {
+    /// The compute pipeline.
+    pub pipeline: wgpu::ComputePipeline,
+    /// By group index.
+    pub groups: Vec<wgpu::BindGroupLayout>,
+}
+
+impl Shader {
+    /// The highest group index plus one.
+    pub fn group_count(&self) -> u32 {
+        self.bindings.iter().map(|b| b.group + 1).max().unwrap_or(0)
+    }
+
+    /// Bind group layouts, one a group.
+    pub fn layouts(&self, device: &wgpu::Device, visibility: wgpu::ShaderStages) -> Vec<wgpu::BindGroupLayout> {
+        (0..self.group_count())
+            .map(|group| {
+                let entries: Vec<_> = self
+                    .bindings
+                    .iter()
+                    .filter(|b| b.group == group)
+                    .map(|b| wgpu::BindGroupLayoutEntry {
+                        binding: b.index,
+                        visibility,
+                        ty: binding_type(b.kind),
+                        count: None,
+                    })
+                    .collect();
+                device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                    label: Some(self.id),
+                    entries: &entries,
+                })
+            })
+            .collect()
+    }
+
+    /// The compute pipeline of this pass from `source` (its own, or an edited one with the same bindings).
+    pub fn compute_pipeline(&self, device: &wgpu::Device, source: &str) -> Pipeline {
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(self.id),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        });
+        let groups = self.layouts(device, wgpu::ShaderStages::COMPUTE);
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(self.id),
+            bind_group_layouts: &groups.iter().map(Some).collect::<Vec<_>>(),
+            immediate_size: 0,
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(self.id),
+            layout: Some(&layout),
+            module: &module,
+            entry_point: Some("main"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            cache: None,
+        });
+        Pipeline { pipeline, groups }
+    }
+
+    /// One bind group a group, every resource found by its name.
+    ///
+    /// # Errors
+    /// `SHADER` naming the binding that nothing was bound to, or that got the wrong kind of resource.
+    pub fn bind_groups(
+        &self,
+        gpu: &Gpu,
+        layouts: &[wgpu::BindGroupLayout],
+        bound: &[(&str, Resource<'_>)],
+    ) -> Result<Vec<wgpu::BindGroup>> {
+        let error = |what: String| Error::Shader { shader: self.id.to_owned(), what };
+        let mut groups = Vec::with_capacity(layouts.len());
+        for (group, layout) in layouts.iter().enumerate() {
+            let mut entries = Vec::new();
+            for binding in self.bindings.iter().filter(|b| b.group as usize == group) {
+                // The last one bound wins, so that a pass can override what it shares.
+                let Some((_, resource)) = bound.iter().rev().find(|(name, _)| *name == binding.name) else {
+                    let names: Vec<_> = bound.iter().map(|(name, _)| *name).collect();
+                    return Err(error(format!("nothing is bound as '{}' (bound: {})", binding.name, names.join(", "))));
+                };
+                let resource = match (resource, is_buffer(binding.kind)) {
+                    (Resource::Buffer(buffer), true) => buffer.as_entire_binding(),
+                    (Resource::Texture(view), false) => wgpu::BindingResource::TextureView(view),
+                    (Resource::Buffer(_), false) => {
+                        return Err(error(format!("'{}' wants a texture, got a buffer", binding.name)));
+                    }
+                    (Resource::Texture(_), true) => {
+                        return Err(error(format!("'{}' wants a buffer, got a texture", binding.name)));
+                    }
+                };
+                entries.push(wgpu::BindGroupEntry { binding: binding.index, resource });
+            }
+            groups.push(gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some(self.id),
+                layout,
+                entries: &entries,
+            }));
+        }
+        Ok(groups)
+    }
+}
+
+/// Something that can be bound.
+#[derive(Debug, Clone, Copy)]
+pub enum Resource<'a> {
+    /// A whole buffer.
+    Buffer(&'a wgpu::Buffer),
+    /// A texture view.
+    Texture(&'a wgpu::TextureView),
+}
+
+impl<'a> From<&'a wgpu::Buffer> for Resource<'a> {
+    fn from(buffer: &'a wgpu::Buffer) -> Self {
+        Resource::Buffer(buffer)
+    }
+}
+
+impl<'a> From<&'a wgpu::TextureView> for Resource<'a> {
+    fn from(view: &'a wgpu::TextureView) -> Self {
+        Resource::Texture(view)
+    }
+}
+
+fn is_buffer(kind: BindingKind) -> bool {
+    matches!(kind, BindingKind::Uniform(_) | BindingKind::StorageRead | BindingKind::StorageReadWrite)
+}
+
+fn binding_type(kind: BindingKind) -> wgpu::BindingType {
+    let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let texture =
+        |sample_type, view_dimension| wgpu::BindingType::Texture { sample_type, view_dimension, multisampled: false };
+    let storage = |format| wgpu::BindingType::StorageTexture {
+        access: wgpu::StorageTextureAccess::WriteOnly,
+        format,
+        view_dimension: wgpu::TextureViewDimension::D2,
+    };
+    let float = wgpu::TextureSampleType::Float { filterable: false };
+    match kind {
+        BindingKind::Uniform(_) => buffer(wgpu::BufferBindingType::Uniform),
+        BindingKind::StorageRead => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
+        BindingKind::StorageReadWrite => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
+        BindingKind::TextureFloat => texture(float, wgpu::TextureViewDimension::D2),
+        BindingKind::TextureUint => texture(wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D2),
+        BindingKind::TextureFloatArray => texture(float, wgpu::TextureViewDimension::D2Array),
+        BindingKind::StorageTextureFloat => storage(wgpu::TextureFormat::Rgba32Float),
+        BindingKind::StorageTextureUint => storage(wgpu::TextureFormat::Rgba32Uint),
+    }
+}

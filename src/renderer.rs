@@ -1,0 +1,485 @@
+//! One scene, one technique, one film: what the page and the command line both drive.
+
+use crate::error::{Error, Result};
+use crate::film::{Counters, Film};
+use crate::frame::{Frame, camera_view};
+use crate::gpu::Gpu;
+use crate::gpu::recorder::{PassTime, Recorder, Timer};
+use crate::gpu::shader::table;
+use crate::gpu_scene::{GpuScene, environment_light};
+use crate::output::Image;
+use crate::params::{FilmParams, Params, RenderParams};
+use crate::scene::{Camera, FlatScene};
+use crate::techniques::{self, Technique};
+use glam::UVec2;
+
+/// Debug views that every technique has; the first is the picture itself.
+pub const COMMON_VIEWS: &[&str] = &["radiance", "albedo", "normal", "depth"];
+
+/// `Frame::view` of the common views after the first, as `shaders/film/view.wgsl` numbers them.
+const FIRST_COMMON_VIEW: u32 = 1000;
+
+/// Seconds of scene time between two frames.
+const FRAME_TIME: f32 = 1.0 / 60.0;
+
+/// Auxiliary pictures of the first surface each pixel sees. Zero where there is none.
+#[derive(Debug, Clone, Default)]
+pub struct Auxiliary {
+    /// Linear base colour.
+    pub albedo: Vec<[f32; 3]>,
+    /// World-space unit shading normal.
+    pub normal: Vec<[f32; 3]>,
+    /// Distance along the view axis in metres.
+    pub depth: Vec<f32>,
+}
+
+/// What was counted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
+pub struct FrameCounters {
+    /// Rays traced in the last frame.
+    pub rays: u64,
+    /// Pixel samples left out of the film because they were not numbers.
+    pub nan: u64,
+    /// Pixel samples left out of the film because they were infinite.
+    pub inf: u64,
+}
+
+/// A scene being rendered.
+pub struct Renderer {
+    gpu: Gpu,
+    scene: FlatScene,
+    gpu_scene: GpuScene,
+    technique: Box<dyn Technique>,
+    technique_ready: bool,
+    film: Film,
+    frame_uniform: wgpu::Buffer,
+    /// This frame's and the previous frame's, by `frame_index & 1`.
+    visibility: [wgpu::TextureView; 2],
+    albedo_depth: wgpu::TextureView,
+    normal: wgpu::TextureView,
+    timer: Option<Timer>,
+    render_params: RenderParams,
+    film_params: FilmParams,
+    camera: Camera,
+    previous_camera: Option<Camera>,
+    view: u32,
+    seed: u32,
+    accumulate: bool,
+    frame_index: u32,
+    accumulated: u32,
+    restart_film: bool,
+    /// One line for each shader edit that did not compile (debug builds).
+    pub shader_problems: Vec<String>,
+}
+
+impl Renderer {
+    /// A renderer of `scene` at `size` pixels, with `restir-di` and the scene's first camera.
+    ///
+    /// # Errors
+    /// `LIMIT`, with numbers, where the device is too small.
+    pub fn new(gpu: Gpu, scene: FlatScene, size: UVec2) -> Result<Self> {
+        let gpu_scene = GpuScene::new(&gpu, &scene)?;
+        let film = Film::new(&gpu, size)?;
+        let camera = scene.cameras.first().cloned().ok_or_else(|| Error::bad_value("scene", "has no camera"))?;
+        let technique = (techniques::ALL[0].create)(&gpu);
+        let [albedo_depth, normal] = auxiliary_textures(&gpu, size);
+        let renderer = Renderer {
+            gpu_scene,
+            technique,
+            technique_ready: false,
+            film,
+            frame_uniform: gpu.uniform("frame", std::mem::size_of::<Frame>() as u64),
+            visibility: visibility_textures(&gpu, size),
+            albedo_depth,
+            normal,
+            timer: Timer::new(&gpu),
+            render_params: RenderParams::default(),
+            film_params: FilmParams::default(),
+            camera,
+            previous_camera: None,
+            view: 0,
+            seed: 0,
+            accumulate: scene.motions.is_empty(),
+            frame_index: 0,
+            accumulated: 0,
+            restart_film: true,
+            shader_problems: Vec::new(),
+            scene,
+            gpu,
+        };
+        renderer.gpu.check()?;
+        Ok(renderer)
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &FlatScene {
+        &self.scene
+    }
+
+    /// The film.
+    pub fn film(&self) -> &Film {
+        &self.film
+    }
+
+    /// Picture size in pixels.
+    pub fn size(&self) -> UVec2 {
+        self.film.size()
+    }
+
+    /// Frames in the accumulated picture.
+    pub fn accumulated_frames(&self) -> u32 {
+        self.accumulated
+    }
+
+    /// The id of the technique in use.
+    pub fn technique(&self) -> &'static str {
+        self.technique.info().id
+    }
+
+    /// The camera in use.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// Replaces the scene; the camera becomes the new scene's first. On error the old scene stays.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn set_scene(&mut self, scene: FlatScene) -> Result<()> {
+        let camera = scene.cameras.first().cloned().ok_or_else(|| Error::bad_value("scene", "has no camera"))?;
+        self.gpu_scene = GpuScene::new(&self.gpu, &scene)?;
+        self.accumulate = scene.motions.is_empty();
+        self.scene = scene;
+        self.camera = camera;
+        self.reset();
+        self.gpu.check()
+    }
+
+    /// Switches to another technique, with its default parameters.
+    ///
+    /// # Errors
+    /// `UNKNOWN_NAME` listing the ids there are.
+    pub fn set_technique(&mut self, id: &str) -> Result<()> {
+        self.technique = (techniques::find(id)?.create)(&self.gpu);
+        if (1..FIRST_COMMON_VIEW).contains(&self.view) {
+            self.view = 0;
+        }
+        self.reset();
+        Ok(())
+    }
+
+    /// Sets a parameter: of the technique by its name, or of a global group as `render.NAME` or `film.NAME`.
+    ///
+    /// # Errors
+    /// `UNKNOWN_NAME` listing the names there are; `BAD_VALUE` saying what the parameter takes.
+    pub fn set(&mut self, key: &str, value: &str) -> Result<()> {
+        let known = match key.split_once('.') {
+            Some(("film", name)) => {
+                // How the picture is shown does not touch what was accumulated.
+                if self.film_params.set(name, value)? {
+                    return Ok(());
+                }
+                false
+            }
+            Some(("render", name)) => self.render_params.set(name, value)?,
+            _ => self.technique.set(key, value)?,
+        };
+        if known {
+            self.reset();
+            return Ok(());
+        }
+        let own = self.technique.info().params.iter().map(|s| s.name.to_owned());
+        let render = RenderParams::SPECS.iter().map(|s| format!("render.{}", s.name));
+        let film = FilmParams::SPECS.iter().map(|s| format!("film.{}", s.name));
+        Err(Error::Unknown {
+            kind: "parameter",
+            name: key.to_owned(),
+            known: own.chain(render).chain(film).collect::<Vec<_>>().join(", "),
+        })
+    }
+
+    /// All parameter values: `{"technique": {...}, "render": {...}, "film": {...}}`.
+    pub fn parameters(&self) -> serde_json::Value {
+        serde_json::json!({
+            "technique": self.technique.values(),
+            "render": self.render_params.values(),
+            "film": self.film_params.values(),
+        })
+    }
+
+    /// Shows a debug view, or `radiance`.
+    ///
+    /// # Errors
+    /// `UNKNOWN_NAME` listing the views there are.
+    pub fn set_view(&mut self, name: &str) -> Result<()> {
+        let own = self.technique.info().views;
+        let common = COMMON_VIEWS.iter().position(|v| *v == name);
+        let technique = own.iter().position(|v| *v == name);
+        self.view = match (common, technique) {
+            (Some(0), _) => 0,
+            (Some(index), _) => FIRST_COMMON_VIEW + index as u32 - 1,
+            (None, Some(index)) => index as u32 + 1,
+            (None, None) => {
+                return Err(Error::Unknown {
+                    kind: "view",
+                    name: name.to_owned(),
+                    known: COMMON_VIEWS.iter().chain(own).copied().collect::<Vec<_>>().join(", "),
+                });
+            }
+        };
+        self.restart_film = true;
+        Ok(())
+    }
+
+    /// Moves the camera. The film starts again; the technique keeps its history and reprojects it.
+    pub fn set_camera(&mut self, camera: &Camera) {
+        self.camera = camera.clone();
+        self.restart_film = true;
+    }
+
+    /// Sets the seed of all random numbers and starts again.
+    pub fn set_seed(&mut self, seed: u32) {
+        self.seed = seed;
+        self.reset();
+    }
+
+    /// Whether frames are averaged. On, time stands still; off, each frame is shown alone and lights move.
+    pub fn set_accumulate(&mut self, accumulate: bool) {
+        self.accumulate = accumulate;
+        self.restart_film = true;
+    }
+
+    /// Starts again: frame 0, no history, an empty film.
+    pub fn reset(&mut self) {
+        self.frame_index = 0;
+        self.previous_camera = None;
+        self.technique_ready = false;
+        self.restart_film = true;
+    }
+
+    /// Changes the picture size and starts again. On error the old size stays.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn resize(&mut self, size: UVec2) -> Result<()> {
+        if size == self.size() {
+            return Ok(());
+        }
+        let film = Film::new(&self.gpu, size)?;
+        self.technique.prepare(&self.gpu, size)?;
+        self.film = film;
+        self.visibility = visibility_textures(&self.gpu, size);
+        [self.albedo_depth, self.normal] = auxiliary_textures(&self.gpu, size);
+        self.reset();
+        self.gpu.check()
+    }
+
+    /// Renders one frame and submits it.
+    ///
+    /// # Errors
+    /// `LIMIT` if the technique's buffers do not fit; `DEVICE` for an error the device has reported.
+    pub fn render_frame(&mut self) -> Result<()> {
+        self.gpu.check()?;
+        self.shader_problems = self.gpu.reload_shaders();
+        let size = self.size();
+        if !self.technique_ready {
+            self.technique.prepare(&self.gpu, size)?;
+            self.technique_ready = true;
+        }
+        if self.frame_index == 0 {
+            self.gpu_scene.animate(&self.gpu, &self.scene, 0.0);
+        }
+        if !self.accumulate {
+            self.gpu_scene.animate(&self.gpu, &self.scene, self.frame_index as f32 * FRAME_TIME);
+        }
+        self.gpu.queue.write_buffer(&self.frame_uniform, 0, bytemuck::bytes_of(&self.frame()));
+        self.film.prepare(&self.gpu, &self.film_params, self.view != 0);
+
+        let restart = self.restart_film || !self.accumulate;
+        let parity = (self.frame_index & 1) as usize;
+        let mut recorder = Recorder::new(&self.gpu, self.timer.as_mut());
+        // Rays are counted by the frame, what was left out since the film began.
+        recorder.encoder.clear_buffer(&self.film.counters, 0, if restart { None } else { Some(4) });
+        self.gpu_scene.share(&mut recorder);
+        self.film.share(&mut recorder);
+        recorder.share("frame", &self.frame_uniform);
+        recorder.share("visibility", &self.visibility[parity]);
+        recorder.share("previous_visibility", &self.visibility[1 - parity]);
+        recorder.pass(&table::SCENE_VISIBILITY).bind("visibility_out", &self.visibility[parity]).dispatch_over(size)?;
+        if self.view >= FIRST_COMMON_VIEW {
+            record_auxiliary(&mut recorder, &self.albedo_depth, &self.normal, size)?;
+            recorder
+                .pass(&table::FILM_VIEW)
+                .bind("albedo_depth", &self.albedo_depth)
+                .bind("normal", &self.normal)
+                .dispatch_over(size)?;
+        } else {
+            self.technique.record(&mut recorder, size)?;
+        }
+        self.film.record_accumulate(&mut recorder, restart)?;
+        recorder.submit();
+
+        self.accumulated = if restart { 1 } else { self.accumulated + 1 };
+        self.restart_film = false;
+        self.previous_camera = Some(self.camera.clone());
+        self.frame_index = self.frame_index.wrapping_add(1);
+        self.gpu.check()
+    }
+
+    /// Brings the display buffer up to date with the film.
+    ///
+    /// # Errors
+    /// `DEVICE` for an error the device has reported.
+    pub fn render_display(&mut self) -> Result<()> {
+        self.film.prepare(&self.gpu, &self.film_params, self.view != 0);
+        let mut recorder = Recorder::new(&self.gpu, None);
+        recorder.share("film", self.film.uniforms());
+        self.film.record_display(&mut recorder, &self.film_params)?;
+        recorder.submit();
+        self.gpu.check()
+    }
+
+    fn frame(&self) -> Frame {
+        let size = self.size();
+        let camera = camera_view(&self.camera, size);
+        let [low, high] = self.scene.bounds;
+        Frame {
+            camera,
+            previous_camera: self.previous_camera.as_ref().map_or(camera, |c| camera_view(c, size)),
+            size,
+            index: self.frame_index,
+            seed: self.seed,
+            max_depth: self.render_params.max_depth,
+            mis_heuristic: self.render_params.mis_heuristic,
+            roulette_start: self.render_params.roulette_start,
+            roulette_minimum: self.render_params.roulette_minimum,
+            roulette_threshold: self.render_params.roulette_threshold,
+            light_count: self.scene.lights.len() as u32,
+            environment_light: environment_light(&self.scene),
+            view: self.view,
+            scene_radius: 0.5 * (high - low).length(),
+            history: (self.frame_index > 0).into(),
+            padding_0: 0,
+            padding_1: 0,
+        }
+    }
+
+    /// Waits for the device. Like all reads it borrows nothing, so frames may be rendered while it is pending.
+    ///
+    /// # Errors
+    /// `DEVICE` for an error it has reported.
+    pub fn wait(&self) -> impl Future<Output = Result<()>> + use<> {
+        let gpu = self.gpu.clone();
+        async move { gpu.wait().await }
+    }
+
+    /// The accumulated picture: linear Rec. 709 radiance.
+    ///
+    /// # Errors
+    /// `DEVICE` if it cannot be read back.
+    pub fn read_image(&self) -> impl Future<Output = Result<Image>> + use<> {
+        let (gpu, accumulation, size) = (self.gpu.clone(), self.film.accumulation.clone(), self.size());
+        async move {
+            let bytes = gpu.read_buffer(&accumulation, accumulation.size()).await?;
+            let pixels = bytes
+                .chunks_exact(16)
+                .take(size.x as usize * size.y as usize)
+                .map(|pixel| {
+                    let [r, g, b, count]: [f32; 4] = bytemuck::pod_read_unaligned(pixel);
+                    [r, g, b].map(|c| c / count.max(1.0))
+                })
+                .collect();
+            Ok(Image { width: size.x, height: size.y, pixels })
+        }
+    }
+
+    /// The picture as it is displayed: sRGB RGBA8, row-major from the top.
+    ///
+    /// # Errors
+    /// `DEVICE` if it cannot be read back.
+    pub fn read_display(&mut self) -> impl Future<Output = Result<Vec<u8>>> + use<> {
+        let rendered = self.render_display();
+        let (gpu, display, size) = (self.gpu.clone(), self.film.display.clone(), self.size());
+        async move {
+            rendered?;
+            gpu.read_buffer(&display, u64::from(size.x) * u64::from(size.y) * 4).await
+        }
+    }
+
+    /// Albedo, normal and depth of the last frame's primary hits.
+    ///
+    /// # Errors
+    /// `DEVICE` if they cannot be read back.
+    pub async fn read_auxiliary(&self) -> Result<Auxiliary> {
+        let mut recorder = Recorder::new(&self.gpu, None);
+        self.gpu_scene.share(&mut recorder);
+        recorder.share("frame", &self.frame_uniform);
+        recorder.share("visibility", &self.visibility[(self.frame_index.wrapping_sub(1) & 1) as usize]);
+        record_auxiliary(&mut recorder, &self.albedo_depth, &self.normal, self.size())?;
+        recorder.submit();
+        let mut out = Auxiliary::default();
+        for texel in self.gpu.read_texture(self.albedo_depth.texture(), 16).await?.chunks_exact(16) {
+            let [r, g, b, depth]: [f32; 4] = bytemuck::pod_read_unaligned(texel);
+            out.albedo.push([r, g, b]);
+            out.depth.push(depth);
+        }
+        for texel in self.gpu.read_texture(self.normal.texture(), 16).await?.chunks_exact(16) {
+            let [x, y, z, _]: [f32; 4] = bytemuck::pod_read_unaligned(texel);
+            out.normal.push([x, y, z]);
+        }
+        Ok(out)
+    }
+
+    /// Rays of the last frame, and what was left out of the film.
+    ///
+    /// # Errors
+    /// `DEVICE` if it cannot be read back.
+    pub fn counters(&self) -> impl Future<Output = Result<FrameCounters>> + use<> {
+        let (gpu, counters) = (self.gpu.clone(), self.film.counters.clone());
+        async move {
+            let bytes = gpu.read_buffer(&counters, std::mem::size_of::<Counters>() as u64).await?;
+            let counters: Counters = bytemuck::pod_read_unaligned(&bytes);
+            Ok(FrameCounters { rays: counters.rays.into(), nan: counters.nan.into(), inf: counters.infinite.into() })
+        }
+    }
+
+    /// GPU time of each pass of the last frame; empty where the device cannot time.
+    ///
+    /// # Errors
+    /// `DEVICE` if they cannot be read back.
+    pub fn pass_times(&self) -> impl Future<Output = Result<Vec<PassTime>>> + use<> {
+        let (gpu, timer) = (self.gpu.clone(), self.timer.clone());
+        async move {
+            match &timer {
+                Some(timer) => timer.read(&gpu).await,
+                None => Ok(Vec::new()),
+            }
+        }
+    }
+}
+
+fn visibility_textures(gpu: &Gpu, size: UVec2) -> [wgpu::TextureView; 2] {
+    [0, 1].map(|_| gpu.texture("visibility", size, wgpu::TextureFormat::Rgba32Uint))
+}
+
+fn auxiliary_textures(gpu: &Gpu, size: UVec2) -> [wgpu::TextureView; 2] {
+    ["albedo and depth", "normal"].map(|label| gpu.texture(label, size, wgpu::TextureFormat::Rgba32Float))
+}
+
+fn record_auxiliary(
+    recorder: &mut Recorder<'_>,
+    albedo_depth: &wgpu::TextureView,
+    normal: &wgpu::TextureView,
+    size: UVec2,
+) -> Result<()> {
+    recorder
+        .pass(&table::SCENE_AUXILIARY)
+        .bind("albedo_depth_out", albedo_depth)
+        .bind("normal_out", normal)
+        .dispatch_over(size)
+}

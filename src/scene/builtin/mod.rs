@@ -1,0 +1,69 @@
+//! Procedural, seeded scenes.
+
+mod cornell;
+
+use super::{Instance, Material, Mesh, Scene};
+use crate::error::{Error, Result};
+use glam::{Mat4, Vec3};
+
+/// One built-in scene, for menus and `restir scenes`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BuiltinInfo {
+    /// What to pass to [`make`], before any `:`.
+    pub name: &'static str,
+    /// For menus.
+    pub title: &'static str,
+    /// One sentence.
+    pub doc: &'static str,
+    /// A whole name that [`make`] accepts.
+    pub example: &'static str,
+}
+
+/// Every built-in scene.
+pub const ALL: &[BuiltinInfo] = &[
+    BuiltinInfo {
+        name: "cornell",
+        title: "Cornell box",
+        doc: "The classic box, a metre a side, with one parallelogram light under the ceiling.",
+        example: "cornell",
+    },
+    BuiltinInfo {
+        name: "cornell-64",
+        title: "Cornell box, 64 revolving lights",
+        doc: "The Cornell box with 64 coloured point lights that revolve round its vertical axis.",
+        example: "cornell-64",
+    },
+];
+
+/// Makes a built-in scene; the same name gives the same scene.
+///
+/// # Errors
+/// [`Error::Unknown`] for a name that is not in [`ALL`]; [`Error::BadValue`] for a bad number after the `:`.
+pub fn make(name: &str) -> Result<Scene> {
+    match name {
+        "cornell" => Ok(cornell::cornell()),
+        "cornell-64" => Ok(cornell::cornell_64()),
+        _ => Err(Error::Unknown {
+            kind: "built-in scene",
+            name: name.to_owned(),
+            known: ALL.iter().map(|info| info.example).collect::<Vec<_>>().join(", "),
+        }),
+    }
+}
+
+/// A rough dielectric.
+fn matte(name: &str, color: Vec3) -> Material {
+    Material { name: name.to_owned(), base_color: color.extend(1.0), metallic: 0.0, ..Material::default() }
+}
+
+/// Adds a mesh and one placement of it.
+fn place(scene: &mut Scene, mesh: Mesh, transform: Mat4) {
+    scene.instances.push(Instance { mesh: scene.meshes.len() as u32, transform });
+    scene.meshes.push(mesh);
+}
+
+/// A bright saturated colour round the colour wheel (one turn is 1), its mean about 1/2 whatever the hue.
+fn hue(turn: f32) -> Vec3 {
+    let wave = |shift: f32| 0.5 + 0.45 * ((turn + shift) * std::f32::consts::TAU).cos();
+    Vec3::new(wave(0.0), wave(-1.0 / 3.0), wave(1.0 / 3.0))
+}

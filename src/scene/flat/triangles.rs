@@ -1,0 +1,176 @@
+//! Instances baked to world-space triangles.
+
+use crate::error::{Error, Result};
+use crate::scene::gpu_types::{
+    NONE, TRIANGLE_ALPHA_MASK, TRIANGLE_BITANGENT_SHIFT, TRIANGLE_DOUBLE_SIDED, TRIANGLE_TANGENTS, Triangle,
+};
+use crate::scene::{AlphaMode, Instance, Mesh, Scene, octahedral};
+use glam::{Mat3, Vec2, Vec3, Vec4};
+
+/// Most triangles after instancing: 2 GiB of them.
+const MAX_TRIANGLES: u64 = 1 << 24;
+/// Farther out, products of three lengths no longer fit in f32, in metres.
+const MAX_COORDINATE: f32 = 1e9;
+/// Twice the area below which a triangle has none, in square metres: its square would be denormal.
+const MIN_TWICE_AREA: f32 = 1e-18;
+
+/// What baking found.
+pub(super) struct Baked {
+    pub triangles: Vec<Triangle>,
+    pub dropped: u64,
+}
+
+/// Bakes every instance. Meshes must have been checked by [`check`].
+pub(super) fn bake(scene: &Scene, progress: &mut dyn FnMut(f32, &str)) -> Result<Baked> {
+    let counts = scene.instances.iter().enumerate().map(|(i, instance)| {
+        let mesh = scene.meshes.get(instance.mesh as usize);
+        mesh.map(|mesh| mesh.indices.len() as u64 / 3)
+            .ok_or_else(|| Error::bad_value(format!("instance {i}"), format!("there is no mesh {}", instance.mesh)))
+    });
+    let total: u64 = counts.sum::<Result<u64>>()?;
+    if total > MAX_TRIANGLES {
+        return Err(Error::Limit {
+            what: "the scene after instancing".into(),
+            wanted: total,
+            had: MAX_TRIANGLES,
+            unit: "triangles",
+        });
+    }
+    for (i, mesh) in scene.meshes.iter().enumerate() {
+        check(mesh, scene.materials.len()).map_err(|what| Error::bad_value(format!("mesh {i}"), what))?;
+    }
+    let mut baked = Baked { triangles: Vec::with_capacity(total as usize), dropped: 0 };
+    let instance_count = scene.instances.len().max(1) as f32;
+    for (i, instance) in scene.instances.iter().enumerate() {
+        progress(i as f32 / instance_count, "placing meshes");
+        let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
+        let flags = scene.materials.get(mesh.material as usize).map_or(0, |material| {
+            let masked = matches!(material.alpha, AlphaMode::Mask(_));
+            u32::from(material.double_sided) * TRIANGLE_DOUBLE_SIDED + u32::from(masked) * TRIANGLE_ALPHA_MASK
+        });
+        let placed = Placed::new(mesh, instance, i as u32, flags);
+        for corners in mesh.indices.as_chunks::<3>().0 {
+            match placed.triangle(corners.map(|c| c as usize)) {
+                Some(triangle) => baked.triangles.push(triangle),
+                None => baked.dropped += 1,
+            }
+        }
+    }
+    Ok(baked)
+}
+
+/// Whether every index and attribute count of a mesh fits.
+fn check(mesh: &Mesh, materials: usize) -> std::result::Result<(), String> {
+    let positions = mesh.positions.len();
+    let attributes = [
+        ("normals", mesh.normals.len()),
+        ("tangents", mesh.tangents.len()),
+        ("texture coordinates 0", mesh.uvs[0].len()),
+        ("texture coordinates 1", mesh.uvs[1].len()),
+        ("colours", mesh.colors.len()),
+    ];
+    for (name, count) in attributes {
+        if count != 0 && count != positions {
+            return Err(format!("{count} {name} for {positions} positions"));
+        }
+    }
+    if !mesh.indices.len().is_multiple_of(3) {
+        return Err(format!("{} indices do not make whole triangles", mesh.indices.len()));
+    }
+    if let Some(index) = mesh.indices.iter().find(|&&index| index as usize >= positions) {
+        return Err(format!("index {index} of {positions} positions"));
+    }
+    // Material 0 always exists once flattened: a scene without materials gets the default one.
+    if mesh.material as usize >= materials.max(1) {
+        return Err(format!("there is no material {}", mesh.material));
+    }
+    Ok(())
+}
+
+/// A mesh with everything that placing it needs.
+struct Placed<'a> {
+    mesh: &'a Mesh,
+    instance: &'a Instance,
+    index: u32,
+    flags: u32,
+    linear: Mat3,
+    /// Takes normals along: the cofactors, which exist for singular matrices too, with the determinant's sign.
+    normal_matrix: Mat3,
+    mirrored: bool,
+}
+
+impl<'a> Placed<'a> {
+    fn new(mesh: &'a Mesh, instance: &'a Instance, index: u32, flags: u32) -> Self {
+        let linear = Mat3::from_mat4(instance.transform);
+        let (x, y, z) = (linear.x_axis, linear.y_axis, linear.z_axis);
+        let mirrored = linear.determinant() < 0.0;
+        let sign = if mirrored { -1.0 } else { 1.0 };
+        let normal_matrix = Mat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign;
+        Placed { mesh, instance, index, flags, linear, normal_matrix, mirrored }
+    }
+
+    /// The triangle in world space, or none if it has no area or is not finite.
+    fn triangle(&self, mut corners: [usize; 3]) -> Option<Triangle> {
+        if self.mirrored {
+            corners.swap(1, 2);
+        }
+        let [p0, p1, p2] = corners.map(|c| self.instance.transform.transform_point3(self.mesh.positions[c]));
+        let within = |p: Vec3| p.abs().max_element() <= MAX_COORDINATE && p.is_finite();
+        let scaled_normal = (p1 - p0).cross(p2 - p0);
+        if !(within(p0) && within(p1) && within(p2)) || scaled_normal.length() < MIN_TWICE_AREA {
+            return None;
+        }
+        let face = scaled_normal.normalize();
+        let has_tangents = !self.mesh.tangents.is_empty();
+        let normals = corners.map(|c| {
+            let normal = self.mesh.normals.get(c).and_then(|n| (self.normal_matrix * *n).try_normalize());
+            let pack = if has_tangents { octahedral::pack_off_equator } else { octahedral::pack };
+            pack(normal.unwrap_or(face))
+        });
+        let mut flags = self.flags;
+        let mut angles = [0u32; 3];
+        if has_tangents {
+            flags |= TRIANGLE_TANGENTS;
+            for (k, &corner) in corners.iter().enumerate() {
+                let tangent = self.mesh.tangents[corner];
+                let along = self.linear * tangent.truncate();
+                angles[k] = u32::from(octahedral::tangent_angle(octahedral::unpack(normals[k]), along));
+                // A mirror turns cross(normal, tangent) round against the mirrored bitangent.
+                if (tangent.w < 0.0) != self.mirrored {
+                    flags |= 1 << (TRIANGLE_BITANGENT_SHIFT + k as u32);
+                }
+            }
+        }
+        let uv = |set: usize, k: usize| finite_or_zero(self.mesh.uvs[set].get(corners[k]).copied().unwrap_or_default());
+        let colors = corners.map(|c| self.mesh.colors.get(c).map_or(u32::MAX, |color| pack_color(*color)));
+        let pair = |a: Vec2, b: Vec2| Vec4::new(a.x, a.y, b.x, b.y);
+        Some(Triangle {
+            p0,
+            material: self.mesh.material,
+            p1,
+            light: NONE,
+            p2,
+            instance: self.index,
+            uv_a: pair(uv(0, 0), uv(0, 1)),
+            uv_b: pair(uv(0, 2), uv(1, 0)),
+            uv_c: pair(uv(1, 1), uv(1, 2)),
+            normal_0: normals[0],
+            normal_1: normals[1],
+            normal_2: normals[2],
+            tangents: angles[0] | angles[1] << 16,
+            color_0: colors[0],
+            color_1: colors[1],
+            color_2: colors[2],
+            flags: flags | angles[2] << 16,
+        })
+    }
+}
+
+fn finite_or_zero(uv: Vec2) -> Vec2 {
+    if uv.is_finite() { uv } else { Vec2::ZERO }
+}
+
+/// RGBA8 unorm, red lowest. NaN becomes 0.
+fn pack_color(color: Vec4) -> u32 {
+    u32::from_le_bytes(color.to_array().map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8))
+}

@@ -1,0 +1,95 @@
+//! Rendering methods and their registry. To add one: its shader folder, its file here, one line in [`ALL`], one docs page.
+
+mod normals;
+mod path_tracer;
+mod restir_di;
+mod ris;
+
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::gpu::recorder::Recorder;
+use crate::params::ParamSpec;
+use crate::scene::gpu_types::Layout;
+use glam::UVec2;
+
+/// What a technique is, for menus, the command line and the docs.
+#[derive(Debug)]
+pub struct TechniqueInfo {
+    /// Its key everywhere.
+    pub id: &'static str,
+    /// Its name for people.
+    pub title: &'static str,
+    /// What it does, in one sentence.
+    pub summary: &'static str,
+    /// The papers it implements.
+    pub papers: &'static [&'static str],
+    /// Whether its defaults are unbiased.
+    pub unbiased: bool,
+    /// What bias there is, and in which settings.
+    pub bias: &'static str,
+    /// Its parameters.
+    pub params: &'static [ParamSpec],
+    /// Its debug views beyond those that every technique has.
+    pub views: &'static [&'static str],
+    /// Its structs that have WGSL twins.
+    pub layouts: &'static [Layout],
+    /// Makes one.
+    pub create: fn(&Gpu) -> Box<dyn Technique>,
+}
+
+/// One rendering method. It owns its buffers and records its passes; it knows nothing of windows, pages or other methods.
+pub trait Technique {
+    /// What it is.
+    fn info(&self) -> &'static TechniqueInfo;
+
+    /// Sets a parameter; whether the name was known.
+    ///
+    /// # Errors
+    /// `BAD_VALUE` for a value the parameter does not take.
+    fn set(&mut self, name: &str, value: &str) -> Result<bool>;
+
+    /// Parameter values as a JSON object.
+    fn values(&self) -> serde_json::Value;
+
+    /// Makes buffers for a picture size; called before the first frame and whenever size or parameters changed.
+    ///
+    /// # Errors
+    /// `LIMIT` if the device cannot hold them.
+    fn prepare(&mut self, gpu: &Gpu, size: UVec2) -> Result<()>;
+
+    /// Records one frame. Bound already: the scene, `frame`, `visibility`, `previous_visibility`, `counters` and
+    /// `radiance_out`, which it must write.
+    ///
+    /// # Errors
+    /// `SHADER` if a pass is bound wrongly.
+    fn record(&mut self, recorder: &mut Recorder<'_>, size: UVec2) -> Result<()>;
+}
+
+/// Every technique, in the order of menus.
+pub static ALL: &[&TechniqueInfo] = &[&restir_di::INFO, &ris::INFO, &path_tracer::INFO, &normals::INFO];
+
+/// The technique with this id.
+///
+/// # Errors
+/// `UNKNOWN_NAME` listing the ids there are.
+pub fn find(id: &str) -> Result<&'static TechniqueInfo> {
+    ALL.iter().find(|info| info.id == id).copied().ok_or_else(|| Error::Unknown {
+        kind: "technique",
+        name: id.to_owned(),
+        known: ALL.iter().map(|info| info.id).collect::<Vec<_>>().join(", "),
+    })
+}
+
+/// The registry as JSON: id, title, summary, papers, unbiased, bias, views, params.
+pub fn describe_json() -> serde_json::Value {
+    ALL.iter()
+        .map(|info| {
+            serde_json::json!({
+                "id": info.id, "title": info.title, "summary": info.summary, "papers": info.papers,
+                "unbiased": info.unbiased, "bias": info.bias,
+                "views": crate::renderer::COMMON_VIEWS.iter().chain(info.views).collect::<Vec<_>>(),
+                "params": info.params.iter().map(ParamSpec::describe).collect::<Vec<_>>(),
+            })
+        })
+        .collect()
+}

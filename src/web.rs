@@ -1,0 +1,278 @@
+//! The page's side of the renderer: the only file that names the browser. Every method is thin; errors become
+//! `{code, message}` objects.
+
+use crate::film::blit::Blit;
+use crate::gpu::{Gpu, GpuOptions, instance};
+use crate::params::{FilmParams, ParamSpec, Params, RenderParams};
+use crate::scene::{Camera, Environment, Projection, builtin, environment, gltf};
+use crate::{Error, FlatScene, Renderer, Scene};
+use glam::{UVec2, Vec3};
+use wasm_bindgen::prelude::*;
+
+type JsResult<T> = std::result::Result<T, JsValue>;
+
+/// Runs once when the module is loaded: a panic becomes a console error with a stack.
+#[wasm_bindgen(start)]
+pub fn start() {
+    console_error_panic_hook::set_once();
+}
+
+fn js_error(error: &Error) -> JsValue {
+    let object = js_sys::Object::new();
+    // Setting a property of a fresh object cannot fail.
+    let _ = js_sys::Reflect::set(&object, &"code".into(), &error.code().into());
+    let _ = js_sys::Reflect::set(&object, &"message".into(), &error.to_string().into());
+    object.into()
+}
+
+trait OrJs<T> {
+    fn js(self) -> JsResult<T>;
+}
+
+impl<T> OrJs<T> for crate::Result<T> {
+    fn js(self) -> JsResult<T> {
+        self.map_err(|e| js_error(&e))
+    }
+}
+
+/// The registry as JSON: version, techniques, film and render parameters, built-in scenes.
+#[wasm_bindgen]
+pub fn describe() -> String {
+    let specs = |specs: &[ParamSpec]| specs.iter().map(ParamSpec::describe).collect::<serde_json::Value>();
+    serde_json::json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "techniques": crate::techniques::describe_json(),
+        "film": { "params": specs(FilmParams::SPECS) },
+        "render": { "params": specs(RenderParams::SPECS) },
+        "scenes": builtin::ALL.iter().map(|s| serde_json::json!({
+            "name": s.name, "title": s.title, "doc": s.doc, "example": s.example,
+        })).collect::<serde_json::Value>(),
+    })
+    .to_string()
+}
+
+fn flatten(mut scene: Scene, lights: u32, seed: u32, progress: &js_sys::Function) -> JsResult<Vec<u8>> {
+    scene.ensure_light(lights, seed.into());
+    let mut report = |fraction: f32, what: &str| {
+        let _ = progress.call2(&JsValue::NULL, &fraction.into(), &what.into());
+    };
+    let flat = FlatScene::build(&scene, &mut report).js()?;
+    Ok(flat.to_bytes())
+}
+
+/// A built-in scene as `FlatScene` bytes. For a Worker.
+#[wasm_bindgen]
+pub fn flatten_builtin(name: &str, lights: u32, seed: u32, progress: &js_sys::Function) -> JsResult<Vec<u8>> {
+    flatten(builtin::make(name).js()?, lights, seed, progress)
+}
+
+/// A glTF file as `FlatScene` bytes; `resolve(uri)` gives the bytes of a file beside it, or undefined. For a Worker.
+#[wasm_bindgen]
+pub fn flatten_file(
+    name: &str,
+    bytes: &[u8],
+    resolve: &js_sys::Function,
+    environment_name: &str,
+    environment_bytes: &[u8],
+    lights: u32,
+    seed: u32,
+    progress: &js_sys::Function,
+) -> JsResult<Vec<u8>> {
+    let mut find = |uri: &str| {
+        resolve
+            .call1(&JsValue::NULL, &uri.into())
+            .ok()
+            .filter(|v| v.is_instance_of::<js_sys::Uint8Array>())
+            .map(|v| js_sys::Uint8Array::new(&v).to_vec())
+            .ok_or_else(|| {
+                Error::bad_file(name, uri, "refers to a file that was not given; choose all its files at once")
+            })
+    };
+    let mut scene = gltf::load_bytes(name, bytes, &mut find).js()?;
+    if !environment_bytes.is_empty() {
+        let map: Environment = environment::decode(environment_name, environment_bytes).js()?;
+        scene.environment = Some(map);
+    }
+    flatten(scene, lights, seed, progress)
+}
+
+/// A renderer that presents to a canvas.
+#[wasm_bindgen]
+pub struct Viewer {
+    renderer: Renderer,
+    blit: Blit,
+}
+
+#[wasm_bindgen]
+impl Viewer {
+    /// A viewer of a flattened scene at `width` x `height` pixels.
+    pub async fn create(
+        canvas: web_sys::HtmlCanvasElement,
+        flat_scene: &[u8],
+        width: u32,
+        height: u32,
+    ) -> JsResult<Viewer> {
+        let scene = FlatScene::from_bytes(flat_scene).js()?;
+        let instance = instance();
+        let surface = instance
+            .create_surface(wgpu::SurfaceTarget::Canvas(canvas))
+            .map_err(|e| js_error(&Error::NoAdapter(e.to_string())))?;
+        let gpu = Gpu::from_instance(&instance, Some(&surface), &GpuOptions::default()).await.js()?;
+        let blit = Blit::new(&gpu, surface);
+        Ok(Viewer { renderer: Renderer::new(gpu, scene, UVec2::new(width, height)).js()?, blit })
+    }
+
+    /// Replaces the scene by another flattened one.
+    pub fn load(&mut self, flat_scene: &[u8]) -> JsResult<()> {
+        self.renderer.set_scene(FlatScene::from_bytes(flat_scene).js()?).js()
+    }
+
+    /// Switches to another technique.
+    pub fn set_technique(&mut self, id: &str) -> JsResult<()> {
+        self.renderer.set_technique(id).js()
+    }
+
+    /// Sets a parameter: `name`, `render.name` or `film.name`.
+    pub fn set(&mut self, key: &str, value: &str) -> JsResult<()> {
+        self.renderer.set(key, value).js()
+    }
+
+    /// All parameter values as JSON.
+    pub fn parameters(&self) -> String {
+        self.renderer.parameters().to_string()
+    }
+
+    /// Shows a debug view, or `radiance`.
+    pub fn set_view(&mut self, name: &str) -> JsResult<()> {
+        self.renderer.set_view(name).js()
+    }
+
+    /// Sets the seed and starts again.
+    pub fn set_seed(&mut self, seed: u32) {
+        self.renderer.set_seed(seed);
+    }
+
+    /// Whether frames are averaged (and time stands still).
+    pub fn set_accumulate(&mut self, on: bool) {
+        self.renderer.set_accumulate(on);
+    }
+
+    /// Moves the camera: JSON with position, forward, up and vertical_fov or half_height.
+    pub fn set_camera(&mut self, json: &str) -> JsResult<()> {
+        let camera = camera_from_json(json).js()?;
+        self.renderer.set_camera(&camera);
+        Ok(())
+    }
+
+    /// The scene's cameras as a JSON list.
+    pub fn cameras(&self) -> String {
+        self.renderer.scene().cameras.iter().map(camera_to_json).collect::<serde_json::Value>().to_string()
+    }
+
+    /// World bounds: min xyz, max xyz.
+    pub fn bounds(&self) -> Vec<f32> {
+        self.renderer.scene().bounds.iter().flat_map(|v| v.to_array()).collect()
+    }
+
+    /// Scene statistics, whether it moves, and warnings, as JSON.
+    pub fn info(&self) -> String {
+        let scene = self.renderer.scene();
+        serde_json::json!({
+            "name": scene.name, "stats": scene.stats, "warnings": scene.warnings,
+            "animated": !scene.motions.is_empty(),
+            "adapter": self.renderer.gpu().adapter_name(),
+            "software": self.renderer.gpu().is_software(),
+        })
+        .to_string()
+    }
+
+    /// Changes the picture size.
+    pub fn resize(&mut self, width: u32, height: u32) -> JsResult<()> {
+        self.renderer.resize(UVec2::new(width, height)).js()
+    }
+
+    /// Starts again.
+    pub fn reset(&mut self) {
+        self.renderer.reset();
+    }
+
+    /// Renders one frame and presents it.
+    pub fn render(&mut self) -> JsResult<()> {
+        self.renderer.render_frame().js()?;
+        self.present()
+    }
+
+    /// Presents the film as it is, without a new frame.
+    pub fn present(&mut self) -> JsResult<()> {
+        self.renderer.render_display().js()?;
+        self.blit.present(self.renderer.gpu(), self.renderer.film()).js()
+    }
+
+    /// Frames in the picture.
+    pub fn frames(&self) -> u32 {
+        self.renderer.accumulated_frames()
+    }
+
+    /// Rays, left-out samples and pass times of the last frame, as JSON.
+    pub fn stats(&self) -> js_sys::Promise {
+        let (counters, passes) = (self.renderer.counters(), self.renderer.pass_times());
+        wasm_bindgen_futures::future_to_promise(async move {
+            let mut stats = serde_json::json!(counters.await.js()?);
+            stats["passes"] = serde_json::json!(passes.await.js()?);
+            Ok(stats.to_string().into())
+        })
+    }
+
+    /// Resolves when the device has done everything submitted so far.
+    pub fn idle(&self) -> js_sys::Promise {
+        let wait = self.renderer.wait();
+        wasm_bindgen_futures::future_to_promise(async move { wait.await.js().map(|()| JsValue::UNDEFINED) })
+    }
+
+    /// The displayed picture: RGBA8, row-major from the top.
+    pub fn read_display(&mut self) -> js_sys::Promise {
+        let read = self.renderer.read_display();
+        wasm_bindgen_futures::future_to_promise(async move {
+            Ok(js_sys::Uint8Array::from(read.await.js()?.as_slice()).into())
+        })
+    }
+}
+
+fn camera_to_json(camera: &Camera) -> serde_json::Value {
+    let mut json = serde_json::json!({
+        "name": camera.name, "position": camera.position.to_array(),
+        "forward": camera.forward.to_array(), "up": camera.up.to_array(),
+    });
+    match camera.projection {
+        Projection::Perspective { vertical_fov } => json["vertical_fov"] = vertical_fov.into(),
+        Projection::Orthographic { half_height } => json["half_height"] = half_height.into(),
+    }
+    json
+}
+
+fn camera_from_json(json: &str) -> crate::Result<Camera> {
+    let bad = |what: &str| Error::bad_value("camera", what);
+    let value: serde_json::Value = serde_json::from_str(json).map_err(|e| bad(&e.to_string()))?;
+    let number = |v: &serde_json::Value| v.as_f64().map(|x| x as f32).filter(|x| x.is_finite());
+    let vector = |key: &str| -> crate::Result<Vec3> {
+        let list =
+            value[key].as_array().filter(|a| a.len() == 3).ok_or_else(|| bad(&format!("{key} is not [x, y, z]")))?;
+        let at = |i: usize| number(&list[i]).ok_or_else(|| bad(&format!("{key} is not finite")));
+        Ok(Vec3::new(at(0)?, at(1)?, at(2)?))
+    };
+    let unit = |key: &str| vector(key)?.try_normalize().ok_or_else(|| bad(&format!("{key} has no direction")));
+    let projection = match (number(&value["vertical_fov"]), number(&value["half_height"])) {
+        (Some(vertical_fov), _) if vertical_fov > 0.0 && vertical_fov < 3.14 => {
+            Projection::Perspective { vertical_fov }
+        }
+        (_, Some(half_height)) if half_height > 0.0 => Projection::Orthographic { half_height },
+        _ => return Err(bad("needs vertical_fov between 0 and pi, or half_height above 0")),
+    };
+    Ok(Camera {
+        name: String::new(),
+        position: vector("position")?,
+        forward: unit("forward")?,
+        up: unit("up")?,
+        projection,
+    })
+}
