@@ -16,7 +16,7 @@ function rustSummary(output) {
 const nodeSummary = (output) => `${/^. pass (\d+)/m.exec(output)?.[1] ?? 0} passed`;
 
 const browserTests = (browser, env) => async () =>
-  nodeSummary(await run(['node', '--test', '--test-concurrency=1', 'tests/browser/'], { env: { ...env, BROWSER: browser } }));
+  nodeSummary(await run(['node', '--test', '--test-reporter=spec', 'tests/browser/page.test.mjs'], { env: { ...env, BROWSER: browser } }));
 
 function steps() {
   const env = softwareEnvironment();
