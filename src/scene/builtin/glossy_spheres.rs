@@ -1,7 +1,8 @@
-//! Rows of spheres from smooth to rough and from plastic to metal, on a checkered floor under three panels.
+//! Rows of spheres from smooth to rough and from plastic to metal, on a checkered floor under three panels and a dim
+//! sky.
 
 use super::{matte, place};
-use crate::scene::{Camera, Material, Mesh, Scene, shapes};
+use crate::scene::{Camera, Environment, Material, Mesh, Scene, shapes};
 use glam::{Mat4, Vec3};
 
 const ROUGHNESS: [f32; 7] = [0.05, 0.12, 0.22, 0.35, 0.5, 0.7, 1.0];
@@ -13,7 +14,7 @@ const SPACING: f32 = 1.25;
 const CELLS: i32 = 32;
 const CELL: f32 = 0.625;
 const PANEL: f32 = 1.6;
-const PANEL_RADIANCE: f32 = 9.0;
+const PANEL_RADIANCE: f32 = 12.0;
 
 pub(super) fn glossy_spheres() -> Scene {
     let [dark, bright, wall, panel] = [0, 1, 2, 3];
@@ -25,11 +26,13 @@ pub(super) fn glossy_spheres() -> Scene {
             matte("wall", Vec3::new(0.45, 0.5, 0.55)),
             Material { emissive: Vec3::new(1.0, 0.95, 0.88) * PANEL_RADIANCE, ..matte("panel", Vec3::splat(0.5)) },
         ],
+        // So that mirrors have something to show.
+        environment: Some(Environment::even(Vec3::new(0.2, 0.23, 0.28))),
         cameras: vec![Camera::look_at(
             "front",
-            Vec3::new(0.0, 4.2, 8.6),
-            Vec3::new(0.0, 0.35, 0.0),
-            34f32.to_radians(),
+            Vec3::new(0.0, 4.6, 8.6),
+            Vec3::new(0.0, 0.3, 0.0),
+            33.5f32.to_radians(),
         )],
         ..Scene::default()
     };

@@ -47,7 +47,7 @@ pub(super) fn many_lights(count: &str) -> Result<Scene> {
     }
     for (i, mut mesh) in lights(count).into_iter().enumerate().filter(|(_, mesh)| !mesh.indices.is_empty()) {
         mesh.material = scene.materials.len() as u32;
-        let emissive = hue(i as f32 / COLORS as f32) * RADIANCE;
+        let emissive = hue((i as f32 + 1.0) / COLORS as f32) * RADIANCE;
         scene.materials.push(Material { emissive, ..matte("light", Vec3::ZERO) });
         place(&mut scene, mesh, Mat4::IDENTITY);
     }
@@ -105,7 +105,7 @@ fn lights(count: u32) -> Vec<Mesh> {
         let normal = (facing + 0.5 * random.direction()).normalize();
         let (u, v) = normal.any_orthonormal_pair();
         let spin = random.range(0.0, TAU);
-        let mesh = &mut meshes[((i + random.next_u32() % COLORS) % COLORS) as usize];
+        let mesh = &mut meshes[(i % COLORS) as usize];
         let base = mesh.positions.len() as u32;
         for corner in 0..3 {
             let (sin, cos) = (spin + corner as f32 * TAU / 3.0).sin_cos();

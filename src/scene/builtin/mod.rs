@@ -58,7 +58,7 @@ pub const ALL: &[BuiltinInfo] = &[
     BuiltinInfo {
         name: "glossy-spheres",
         title: "Glossy spheres",
-        doc: "Spheres from smooth to rough and from plastic to metal, under three panels.",
+        doc: "Spheres from smooth to rough and from plastic to metal, under three panels and a dim sky.",
         example: "glossy-spheres",
     },
 ];

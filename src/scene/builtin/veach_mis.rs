@@ -10,7 +10,7 @@ const EYE: Vec3 = Vec3::new(0.0, 2.0, 15.0);
 const RADII: [f32; 4] = [0.033, 0.1, 0.3, 0.9];
 const SPACING: f32 = 2.5;
 /// Radiance times squared radius, the same for all: equal power.
-const RADIANCE_TIMES_AREA: f32 = 1.8;
+const RADIANCE_TIMES_SQUARED_RADIUS: f32 = 3.0;
 /// (centre of the plate (y, z), roughness), from the back.
 const PLATES: [(f32, f32, f32); 4] = [(-2.4, -0.13, 0.05), (-3.06, 0.92, 0.11), (-3.58, 2.22, 0.23), (-3.9, 3.57, 0.5)];
 const PLATE_SIZE: Vec3 = Vec3::new(8.0, 0.1, 1.05);
@@ -20,7 +20,7 @@ pub(super) fn veach_mis() -> Scene {
     let mut scene = Scene {
         name: "veach-mis".into(),
         materials: vec![matte("grey", Vec3::splat(0.45))],
-        cameras: vec![Camera::look_at("front", EYE, Vec3::new(0.0, -1.9, 2.0), 30f32.to_radians())],
+        cameras: vec![Camera::look_at("front", EYE, Vec3::new(0.0, -2.2, 2.0), 31f32.to_radians())],
         ..Scene::default()
     };
     let (floor, back) = (-4.6, -3.5);
@@ -30,7 +30,7 @@ pub(super) fn veach_mis() -> Scene {
     for (i, radius) in RADII.into_iter().enumerate() {
         let x = (i as f32 - 0.5 * (RADII.len() - 1) as f32) * SPACING;
         let tint = Vec3::ONE.lerp(2.0 * hue(i as f32 / RADII.len() as f32), 0.4);
-        let emissive = tint * (RADIANCE_TIMES_AREA / (radius * radius));
+        let emissive = tint * (RADIANCE_TIMES_SQUARED_RADIUS / (radius * radius));
         let material = add(&mut scene, Material { emissive, ..matte("light", Vec3::ZERO) });
         place(&mut scene, shapes::sphere(Vec3::X * x, radius, 16, material), Mat4::IDENTITY);
     }

@@ -1,9 +1,11 @@
 //! A scene as plain arrays with a BVH: what is uploaded, sent from a Worker to the page, and kept to rebuild a lost device.
 
 mod atlas;
+mod bytes;
 mod lights;
 mod materials;
 mod triangles;
+mod validate;
 
 use super::gpu_types::{BvhNode, EnvironmentTexel, Light, Material, NONE, Triangle};
 use super::{Camera, LightMotion, MAX_COORDINATE, Projection, PunctualKind, Scene, bvh};
