@@ -1,6 +1,8 @@
 //! What the GPU tests share: one device a test binary, scenes in small pictures, and statistics.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+pub mod gltf_writer;
+
 use restir::{FlatScene, Gpu, GpuOptions, Image, Renderer, Scene};
 
 /// A device within WebGPU's default limits: what passes here runs everywhere.
