@@ -14,6 +14,8 @@ pub mod params;
 pub mod renderer;
 pub mod scene;
 pub mod techniques;
+#[cfg(target_arch = "wasm32")]
+mod web;
 
 pub use error::{Error, Result};
 pub use gpu::{Gpu, GpuOptions};

@@ -369,40 +369,46 @@ impl Renderer {
         }
     }
 
-    /// Waits for the device.
+    /// Waits for the device. Like all reads it borrows nothing, so frames may be rendered while it is pending.
     ///
     /// # Errors
     /// `DEVICE` for an error it has reported.
-    pub async fn wait(&self) -> Result<()> {
-        self.gpu.wait().await
+    pub fn wait(&self) -> impl Future<Output = Result<()>> + use<> {
+        let gpu = self.gpu.clone();
+        async move { gpu.wait().await }
     }
 
     /// The accumulated picture: linear Rec. 709 radiance.
     ///
     /// # Errors
     /// `DEVICE` if it cannot be read back.
-    pub async fn read_image(&self) -> Result<Image> {
-        let size = self.size();
-        let bytes = self.gpu.read_buffer(&self.film.accumulation, self.film.accumulation.size()).await?;
-        let pixels = bytes
-            .chunks_exact(16)
-            .take(size.x as usize * size.y as usize)
-            .map(|pixel| {
-                let [r, g, b, count]: [f32; 4] = bytemuck::pod_read_unaligned(pixel);
-                [r, g, b].map(|c| c / count.max(1.0))
-            })
-            .collect();
-        Ok(Image { width: size.x, height: size.y, pixels })
+    pub fn read_image(&self) -> impl Future<Output = Result<Image>> + use<> {
+        let (gpu, accumulation, size) = (self.gpu.clone(), self.film.accumulation.clone(), self.size());
+        async move {
+            let bytes = gpu.read_buffer(&accumulation, accumulation.size()).await?;
+            let pixels = bytes
+                .chunks_exact(16)
+                .take(size.x as usize * size.y as usize)
+                .map(|pixel| {
+                    let [r, g, b, count]: [f32; 4] = bytemuck::pod_read_unaligned(pixel);
+                    [r, g, b].map(|c| c / count.max(1.0))
+                })
+                .collect();
+            Ok(Image { width: size.x, height: size.y, pixels })
+        }
     }
 
     /// The picture as it is displayed: sRGB RGBA8, row-major from the top.
     ///
     /// # Errors
     /// `DEVICE` if it cannot be read back.
-    pub async fn read_display(&mut self) -> Result<Vec<u8>> {
-        self.render_display()?;
-        let size = self.size();
-        self.gpu.read_buffer(&self.film.display, u64::from(size.x) * u64::from(size.y) * 4).await
+    pub fn read_display(&mut self) -> impl Future<Output = Result<Vec<u8>>> + use<> {
+        let rendered = self.render_display();
+        let (gpu, display, size) = (self.gpu.clone(), self.film.display.clone(), self.size());
+        async move {
+            rendered?;
+            gpu.read_buffer(&display, u64::from(size.x) * u64::from(size.y) * 4).await
+        }
     }
 
     /// Albedo, normal and depth of the last frame's primary hits.
@@ -433,20 +439,26 @@ impl Renderer {
     ///
     /// # Errors
     /// `DEVICE` if it cannot be read back.
-    pub async fn counters(&self) -> Result<FrameCounters> {
-        let bytes = self.gpu.read_buffer(&self.film.counters, std::mem::size_of::<Counters>() as u64).await?;
-        let counters: Counters = bytemuck::pod_read_unaligned(&bytes);
-        Ok(FrameCounters { rays: counters.rays.into(), nan: counters.nan.into(), inf: counters.infinite.into() })
+    pub fn counters(&self) -> impl Future<Output = Result<FrameCounters>> + use<> {
+        let (gpu, counters) = (self.gpu.clone(), self.film.counters.clone());
+        async move {
+            let bytes = gpu.read_buffer(&counters, std::mem::size_of::<Counters>() as u64).await?;
+            let counters: Counters = bytemuck::pod_read_unaligned(&bytes);
+            Ok(FrameCounters { rays: counters.rays.into(), nan: counters.nan.into(), inf: counters.infinite.into() })
+        }
     }
 
     /// GPU time of each pass of the last frame; empty where the device cannot time.
     ///
     /// # Errors
     /// `DEVICE` if they cannot be read back.
-    pub async fn pass_times(&self) -> Result<Vec<PassTime>> {
-        match &self.timer {
-            Some(timer) => timer.read(&self.gpu).await,
-            None => Ok(Vec::new()),
+    pub fn pass_times(&self) -> impl Future<Output = Result<Vec<PassTime>>> + use<> {
+        let (gpu, timer) = (self.gpu.clone(), self.timer.clone());
+        async move {
+            match &timer {
+                Some(timer) => timer.read(&gpu).await,
+                None => Ok(Vec::new()),
+            }
         }
     }
 }

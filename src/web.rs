@@ -84,7 +84,9 @@ pub fn flatten_file(
             .ok()
             .filter(|v| v.is_instance_of::<js_sys::Uint8Array>())
             .map(|v| js_sys::Uint8Array::new(&v).to_vec())
-            .ok_or_else(|| Error::bad_file(name, uri, "refers to a file that was not given; choose all its files at once"))
+            .ok_or_else(|| {
+                Error::bad_file(name, uri, "refers to a file that was not given; choose all its files at once")
+            })
     };
     let mut scene = gltf::load_bytes(name, bytes, &mut find).js()?;
     if !environment_bytes.is_empty() {
@@ -213,22 +215,25 @@ impl Viewer {
 
     /// Rays, left-out samples and pass times of the last frame, as JSON.
     pub fn stats(&self) -> js_sys::Promise {
-        // The browser may call other methods meanwhile, so the future may not borrow the viewer.
-        let read = self.renderer.stats();
-        wasm_bindgen_futures::future_to_promise(async move { Ok(read.await.js()?.to_string().into()) })
+        let (counters, passes) = (self.renderer.counters(), self.renderer.pass_times());
+        wasm_bindgen_futures::future_to_promise(async move {
+            let mut stats = serde_json::json!(counters.await.js()?);
+            stats["passes"] = serde_json::json!(passes.await.js()?);
+            Ok(stats.to_string().into())
+        })
     }
 
     /// Resolves when the device has done everything submitted so far.
     pub fn idle(&self) -> js_sys::Promise {
-        let wait = self.renderer.idle();
+        let wait = self.renderer.wait();
         wasm_bindgen_futures::future_to_promise(async move { wait.await.js().map(|()| JsValue::UNDEFINED) })
     }
 
     /// The displayed picture: RGBA8, row-major from the top.
     pub fn read_display(&mut self) -> js_sys::Promise {
-        let read = self.renderer.display_reader();
+        let read = self.renderer.read_display();
         wasm_bindgen_futures::future_to_promise(async move {
-            Ok(js_sys::Uint8Array::from(read.js()?.await.js()?.as_slice()).into())
+            Ok(js_sys::Uint8Array::from(read.await.js()?.as_slice()).into())
         })
     }
 }
@@ -250,15 +255,24 @@ fn camera_from_json(json: &str) -> crate::Result<Camera> {
     let value: serde_json::Value = serde_json::from_str(json).map_err(|e| bad(&e.to_string()))?;
     let number = |v: &serde_json::Value| v.as_f64().map(|x| x as f32).filter(|x| x.is_finite());
     let vector = |key: &str| -> crate::Result<Vec3> {
-        let list = value[key].as_array().filter(|a| a.len() == 3).ok_or_else(|| bad(&format!("{key} is not [x, y, z]")))?;
+        let list =
+            value[key].as_array().filter(|a| a.len() == 3).ok_or_else(|| bad(&format!("{key} is not [x, y, z]")))?;
         let at = |i: usize| number(&list[i]).ok_or_else(|| bad(&format!("{key} is not finite")));
         Ok(Vec3::new(at(0)?, at(1)?, at(2)?))
     };
     let unit = |key: &str| vector(key)?.try_normalize().ok_or_else(|| bad(&format!("{key} has no direction")));
     let projection = match (number(&value["vertical_fov"]), number(&value["half_height"])) {
-        (Some(vertical_fov), _) if vertical_fov > 0.0 && vertical_fov < 3.14 => Projection::Perspective { vertical_fov },
+        (Some(vertical_fov), _) if vertical_fov > 0.0 && vertical_fov < 3.14 => {
+            Projection::Perspective { vertical_fov }
+        }
         (_, Some(half_height)) if half_height > 0.0 => Projection::Orthographic { half_height },
         _ => return Err(bad("needs vertical_fov between 0 and pi, or half_height above 0")),
     };
-    Ok(Camera { name: String::new(), position: vector("position")?, forward: unit("forward")?, up: unit("up")?, projection })
+    Ok(Camera {
+        name: String::new(),
+        position: vector("position")?,
+        forward: unit("forward")?,
+        up: unit("up")?,
+        projection,
+    })
 }

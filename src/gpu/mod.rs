@@ -22,8 +22,8 @@ pub struct GpuOptions {
     pub default_limits: bool,
 }
 
-/// A device and queue with the pipelines made on it.
-#[derive(Debug)]
+/// A device and queue with the pipelines made on it. A clone is another handle on the same device.
+#[derive(Debug, Clone)]
 pub struct Gpu {
     /// The device.
     pub device: wgpu::Device,
@@ -33,9 +33,9 @@ pub struct Gpu {
     pub has_timestamps: bool,
     adapter: wgpu::AdapterInfo,
     failure: Arc<Mutex<Option<String>>>,
-    pipelines: Mutex<HashMap<&'static str, Pipeline>>,
+    pipelines: Arc<Mutex<HashMap<&'static str, Pipeline>>>,
     #[cfg(all(debug_assertions, not(target_arch = "wasm32")))]
-    reloader: Mutex<Option<reload::Reloader>>,
+    reloader: Arc<Mutex<Option<reload::Reloader>>>,
 }
 
 /// The default instance: WebGPU on the web, Vulkan elsewhere.
@@ -112,9 +112,9 @@ impl Gpu {
             has_timestamps,
             adapter: adapter.get_info(),
             failure,
-            pipelines: Mutex::default(),
+            pipelines: Arc::default(),
             #[cfg(all(debug_assertions, not(target_arch = "wasm32")))]
-            reloader: Mutex::new(reload::Reloader::of_source_tree()),
+            reloader: Arc::new(Mutex::new(reload::Reloader::of_source_tree())),
         })
     }
 

@@ -18,7 +18,7 @@ pub struct PassTime {
 }
 
 /// The timestamp queries of one frame.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Timer {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,

@@ -34,9 +34,12 @@ fn combination_offer(combination: ptr<function, Combination>, canonical: Surface
     let sample = reservoir_sample(reservoir);
     let weight = confidence_weight * target_function(canonical, sample, false)
         * reservoir.unbiased_contribution_weight;
-    if stream_update(&(*combination).stream, sample, weight, u) {
+    // By way of a copy: WGSL's base language has no pointers to members as arguments.
+    var stream = (*combination).stream;
+    if stream_update(&stream, sample, weight, u) {
         (*combination).source = domain;
     }
+    (*combination).stream = stream;
 }
 
 // Step 2, once a domain: how likely the domain would have been to make the selected sample.

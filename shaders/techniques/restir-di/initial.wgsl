@@ -28,7 +28,10 @@ fn sample_pixel(pixel: vec2u) {
         let weight = candidate_weight(surface, sample, params.light_samples);
         let u = random_4(&rng);
         for (var slot = 0u; slot < slots; slot += 1u) {
-            stream_update(&streams[slot], sample, weight, u[slot]);
+            // By way of a copy: naga cannot pass a pointer to a dynamically indexed element.
+            var stream = streams[slot];
+            stream_update(&stream, sample, weight, u[slot]);
+            streams[slot] = stream;
         }
     }
     for (var slot = 0u; slot < slots; slot += 1u) {

@@ -57,7 +57,7 @@ pub(super) fn build(
     for (light, entry) in lights.iter_mut().zip(alias::build(&weights)) {
         light.pmf = entry.pmf;
         light.alias_threshold = entry.threshold;
-        light.alias = entry.alias;
+        light.alias_light = entry.alias;
     }
     Ok((lights, first_punctual))
 }

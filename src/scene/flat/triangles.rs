@@ -4,13 +4,11 @@ use crate::error::{Error, Result};
 use crate::scene::gpu_types::{
     NONE, TRIANGLE_ALPHA_MASK, TRIANGLE_BITANGENT_SHIFT, TRIANGLE_DOUBLE_SIDED, TRIANGLE_TANGENTS, Triangle,
 };
-use crate::scene::{AlphaMode, Instance, Mesh, Scene, octahedral};
+use crate::scene::{AlphaMode, Instance, MAX_COORDINATE, Mesh, Scene, octahedral};
 use glam::{Mat3, Vec2, Vec3, Vec4};
 
 /// Most triangles after instancing: 2 GiB of them.
 const MAX_TRIANGLES: u64 = 1 << 24;
-/// Farther out, products of three lengths no longer fit in f32, in metres.
-const MAX_COORDINATE: f32 = 1e9;
 /// Twice the area below which a triangle has none, in square metres: its square would be denormal.
 const MIN_TWICE_AREA: f32 = 1e-18;
 
@@ -74,7 +72,7 @@ fn check(mesh: &Mesh, materials: usize) -> std::result::Result<(), String> {
             return Err(format!("{count} {name} for {positions} positions"));
         }
     }
-    if mesh.indices.len() % 3 != 0 {
+    if !mesh.indices.len().is_multiple_of(3) {
         return Err(format!("{} indices do not make whole triangles", mesh.indices.len()));
     }
     if let Some(index) = mesh.indices.iter().find(|&&index| index as usize >= positions) {

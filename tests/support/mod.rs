@@ -1,0 +1,48 @@
+//! What the GPU tests share: one device a test binary, scenes in small pictures, and statistics.
+#![allow(dead_code, reason = "each test binary uses its own part")]
+
+pub mod gltf_writer;
+
+use restir::{FlatScene, Gpu, GpuOptions, Image, Renderer, Scene};
+
+/// A device within WebGPU's default limits: what passes here runs everywhere.
+pub fn gpu() -> Gpu {
+    pollster::block_on(Gpu::headless(&GpuOptions { default_limits: true }))
+        .expect("a Vulkan driver (Debian: mesa-vulkan-drivers)")
+}
+
+/// Flattens a scene.
+pub fn flatten(scene: &Scene) -> FlatScene {
+    FlatScene::build(scene, &mut |_, _| ()).expect("the scene flattens")
+}
+
+/// A built-in scene, flattened, with a light if it has none.
+pub fn builtin(name: &str) -> FlatScene {
+    let scene = restir::scene::builtin::make(name).expect("a built-in scene");
+
+    flatten(&scene)
+}
+
+/// A renderer of a scene with a technique and settings.
+pub fn renderer(gpu: &Gpu, scene: FlatScene, size: [u32; 2], technique: &str, settings: &[(&str, &str)]) -> Renderer {
+    let mut renderer = Renderer::new(gpu.clone(), scene, size.into()).expect("a renderer");
+    renderer.set_technique(technique).expect("a technique");
+    for (key, value) in settings {
+        renderer.set(key, value).expect("a setting");
+    }
+    renderer
+}
+
+/// The picture after `frames` frames.
+pub fn render(renderer: &mut Renderer, frames: u32) -> Image {
+    for _ in 0..frames {
+        renderer.render_frame().expect("a frame");
+    }
+    pollster::block_on(renderer.read_image()).expect("a picture")
+}
+
+/// Mean over pixels and channels.
+pub fn mean(image: &Image) -> f64 {
+    let sum: f64 = image.pixels.iter().flatten().map(|c| f64::from(*c)).sum();
+    sum / (3 * image.pixels.len()) as f64
+}
