@@ -59,8 +59,9 @@ pub fn rmse(image: &Image, reference: &Image) -> Result<f64> {
 /// What [`relmse`] adds to the squared reference, so that black pixels do not divide by zero.
 pub const RELMSE_EPSILON: f64 = 0.01;
 
-/// Relative mean squared error, mean of (a - b)^2 / (b^2 + 0.01) over channels and pixels (Rousselle, Knaus and
-/// Zwicker, "Adaptive Sampling and Reconstruction using Greedy Error Minimization", 2011, with their epsilon).
+/// Relative mean squared error, mean of (a - b)^2 / (b^2 + 0.01) over channels and pixels (after Rousselle, Knaus and
+/// Zwicker, "Adaptive Sampling and Reconstruction using Greedy Error Minimization", 2011; the epsilon differs from
+/// author to author).
 ///
 /// # Errors
 /// As [`check_pair`].
