@@ -1,10 +1,9 @@
 //! The flattened BVH: built by obvhs, laid out for traversal.
 
 use super::gpu_types::{BvhNode, Triangle};
-use glam::Vec3;
+use glam::Vec3A;
 use obvhs::aabb::Aabb;
-use obvhs::bvh2::{Bvh2, leaf_collapser::collapse, reinsertion::ReinsertionOptimizer};
-use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+use obvhs::bvh2::{Bvh2, node::Bvh2Node, reinsertion::ReinsertionOptimizer};
 
 /// No path from the root is longer than this, in nodes: the size of the traversal's stack (`shaders/scene/bvh.wgsl`).
 pub const MAX_DEPTH: u32 = 60;
@@ -24,12 +23,15 @@ pub struct Bvh {
 
 /// Builds over `triangles`: at least one, all corners finite.
 ///
-/// Clustering bottom-up (PLOC, Meister and Bittner 2018), improved by reinsertion (2018), leaves merged by SAH. Where that
-/// comes out deeper than [`MAX_DEPTH`], halves by count are used instead, whose depth is logarithmic.
+/// Top-down by binned SAH (Wald 2007), then improved by obvhs's reinsertion (Meister and Bittner 2018). obvhs's own
+/// bottom-up builder is not used, for equal boxes make it take quadratic time: a hostile file could hang it.
 pub fn build(triangles: &[Triangle]) -> Bvh {
     let boxes: Vec<Aabb> = triangles.iter().map(bounds_of).collect();
-    let clustered = layout(&cluster(&boxes));
-    if clustered.depth <= MAX_DEPTH { clustered } else { build_balanced(&boxes) }
+    let mut tree = split(&boxes);
+    let plain = layout(&tree);
+    optimize(&mut tree);
+    let optimized = layout(&tree);
+    if optimized.depth <= MAX_DEPTH { optimized } else { plain }
 }
 
 /// SAH cost for a ray that hits the root's box: 1 for a node tested, 1 for a triangle tested.
@@ -51,23 +53,131 @@ fn bounds_of(triangle: &Triangle) -> Aabb {
     Aabb::new(p0.min(p1).min(p2).into(), p0.max(p1).max(p2).into())
 }
 
-/// obvhs's own one-call builders ask for the time, which panics on wasm; this is what they do.
-fn cluster(boxes: &[Aabb]) -> Bvh2 {
-    const REINSERTION_BATCH: f32 = 0.05;
-    const SINGLE_NEIGHBOR_PASSES: usize = 3;
-    let indices = (0..boxes.len() as u32).collect();
-    let mut bvh = PlocBuilder::with_capacity(boxes.len()).build(
-        PlocSearchDistance::Medium,
-        boxes,
-        indices,
-        SortPrecision::U64,
-        SINGLE_NEIGHBOR_PASSES,
-    );
-    let mut optimizer = ReinsertionOptimizer::default();
-    optimizer.run(&mut bvh, REINSERTION_BATCH, None);
-    collapse(&mut bvh, MAX_LEAF, 1.0);
-    optimizer.run(&mut bvh, 2.0 * REINSERTION_BATCH, None);
-    bvh
+/// The tree before it is improved, never deeper than [`MAX_DEPTH`].
+fn split(boxes: &[Aabb]) -> Bvh2 {
+    let centers: Vec<Vec3A> = boxes.iter().map(Aabb::center).collect();
+    let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
+    let mut nodes = vec![Bvh2Node::default()];
+    let mut pending = vec![(0usize, 0..order.len(), 1u32)];
+    while let Some((target, range, depth)) = pending.pop() {
+        let part = &mut order[range.clone()];
+        let mut bounds = Aabb::empty();
+        let mut center_bounds = Aabb::empty();
+        for &i in part.iter() {
+            bounds = bounds.union(&boxes[i as usize]);
+            center_bounds.extend(centers[i as usize]);
+        }
+        let cut = if depth < HALVES_FROM { best_cut(part, boxes, &centers, &center_bounds) } else { None };
+        let cost = cut.as_ref().map_or(f32::INFINITY, |cut| bounds.half_area() + cut.cost);
+        let fits = part.len() <= MAX_LEAF as usize;
+        if part.len() == 1 || (fits && cost >= bounds.half_area() * part.len() as f32) {
+            nodes[target] = Bvh2Node::new(bounds, part.len() as u32, range.start as u32);
+            continue;
+        }
+        let middle = match cut {
+            Some(cut) => partition(part, |i| cut.bins.of(centers[i as usize]) <= cut.bin),
+            None => halve(part, &centers, &center_bounds),
+        };
+        let left = nodes.len();
+        nodes[target] = Bvh2Node::new(bounds, 0, left as u32);
+        nodes.resize(left + 2, Bvh2Node::default());
+        pending.push((left + 1, range.start + middle..range.end, depth + 1));
+        pending.push((left, range.start..range.start + middle, depth + 1));
+    }
+    Bvh2 { nodes, primitive_indices: order, max_depth: STACK_DEPTH, ..Bvh2::default() }
+}
+
+/// Below this depth nodes are split into halves by count, so that 2^28 triangles still fit in [`MAX_DEPTH`].
+const HALVES_FROM: u32 = 30;
+/// What reinsertion can make of the depth, generously: the size of its stacks.
+const STACK_DEPTH: usize = 512;
+const BINS: usize = 16;
+
+/// Equal intervals of the centers along one axis.
+struct Bins {
+    axis: usize,
+    start: f32,
+    scale: f32,
+}
+
+impl Bins {
+    fn of(&self, center: Vec3A) -> usize {
+        (((center[self.axis] - self.start) * self.scale) as usize).min(BINS - 1)
+    }
+}
+
+/// Bins 0 to `bin` go left. `cost` is the sum over both sides of half area x triangles.
+struct Cut {
+    bins: Bins,
+    bin: usize,
+    cost: f32,
+}
+
+/// The cheapest cut along any axis; none if the centers coincide.
+fn best_cut(part: &[u32], boxes: &[Aabb], centers: &[Vec3A], center_bounds: &Aabb) -> Option<Cut> {
+    let extent = center_bounds.diagonal();
+    let mut best: Option<Cut> = None;
+    for axis in 0..3 {
+        let bins = Bins { axis, start: center_bounds.min[axis], scale: BINS as f32 / extent[axis] };
+        if !bins.scale.is_finite() {
+            continue;
+        }
+        let mut counts = [0usize; BINS];
+        let mut bounds = [Aabb::empty(); BINS];
+        for &i in part {
+            let bin = bins.of(centers[i as usize]);
+            counts[bin] += 1;
+            bounds[bin] = bounds[bin].union(&boxes[i as usize]);
+        }
+        let side_cost = |bounds: &Aabb, count: usize| if count == 0 { 0.0 } else { bounds.half_area() * count as f32 };
+        let mut right_costs = [0.0; BINS];
+        let (mut side, mut count) = (Aabb::empty(), 0);
+        for bin in (1..BINS).rev() {
+            side = side.union(&bounds[bin]);
+            count += counts[bin];
+            right_costs[bin] = side_cost(&side, count);
+        }
+        (side, count) = (Aabb::empty(), 0);
+        for bin in 0..BINS - 1 {
+            side = side.union(&bounds[bin]);
+            count += counts[bin];
+            let cost = side_cost(&side, count) + right_costs[bin + 1];
+            let proper = count > 0 && count < part.len();
+            if proper && best.as_ref().is_none_or(|best| cost < best.cost) {
+                best = Some(Cut { bins: Bins { ..bins }, bin, cost });
+            }
+        }
+    }
+    best
+}
+
+/// Moves what goes left to the front; how many do.
+fn partition(part: &mut [u32], goes_left: impl Fn(u32) -> bool) -> usize {
+    let mut middle = 0;
+    for i in 0..part.len() {
+        if goes_left(part[i]) {
+            part.swap(i, middle);
+            middle += 1;
+        }
+    }
+    middle
+}
+
+/// Halves by count along the longest axis of the centers.
+fn halve(part: &mut [u32], centers: &[Vec3A], center_bounds: &Aabb) -> usize {
+    let axis = center_bounds.diagonal().max_position();
+    let middle = part.len() / 2;
+    part.select_nth_unstable_by(middle, |&a, &b| centers[a as usize][axis].total_cmp(&centers[b as usize][axis]));
+    middle
+}
+
+/// Moves subtrees to where they cost less, the largest first.
+fn optimize(tree: &mut Bvh2) {
+    /// The fraction of the nodes that the first pass tries to move, and the most nodes it tries.
+    const BATCH: f32 = 0.5;
+    const MAX_BATCH: f32 = 100_000.0;
+    let batch = BATCH.min(MAX_BATCH / tree.nodes.len() as f32);
+    ReinsertionOptimizer::default().run(tree, batch, None);
 }
 
 /// Copies an obvhs tree depth first, siblings together, so that what is near in the tree is near in memory.
@@ -100,43 +210,11 @@ fn layout(bvh: &Bvh2) -> Bvh {
     out
 }
 
-/// Splits at the median along the longest axis of the centroids until a leaf is full: depth log2(n), whatever the shape.
-fn build_balanced(boxes: &[Aabb]) -> Bvh {
-    let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
-    let mut nodes: Vec<BvhNode> = vec![bytemuck::Zeroable::zeroed()];
-    let mut deepest = 0;
-    let centroid = |i: u32| boxes[i as usize].center();
-    let mut pending = vec![(0usize, 0..order.len(), 1u32)];
-    while let Some((target, range, depth)) = pending.pop() {
-        deepest = deepest.max(depth);
-        let part = &mut order[range.clone()];
-        let mut bounds = Aabb::empty();
-        let mut centers = Aabb::empty();
-        for &i in part.iter() {
-            bounds = bounds.union(&boxes[i as usize]);
-            centers.extend(centroid(i));
-        }
-        let (min, max): (Vec3, Vec3) = (bounds.min.into(), bounds.max.into());
-        nodes[target] = if part.len() <= MAX_LEAF as usize {
-            BvhNode { min, first: range.start as u32, max, count: part.len() as u32 }
-        } else {
-            let axis = centers.diagonal().max_position();
-            let half = part.len() / 2;
-            part.select_nth_unstable_by(half, |&a, &b| centroid(a)[axis].total_cmp(&centroid(b)[axis]));
-            let left = nodes.len();
-            nodes.resize(left + 2, bytemuck::Zeroable::zeroed());
-            pending.push((left + 1, range.start + half..range.end, depth + 1));
-            pending.push((left, range.start..range.start + half, depth + 1));
-            BvhNode { min, first: left as u32, max, count: 0 }
-        };
-    }
-    Bvh { nodes, order, depth: deepest }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::random::Random;
+    use glam::Vec3;
 
     fn triangle(corners: [Vec3; 3]) -> Triangle {
         let [p0, p1, p2] = corners;
@@ -186,41 +264,55 @@ mod tests {
         assert!(deepest <= MAX_DEPTH);
     }
 
+    fn checked(triangles: &[Triangle]) -> Bvh {
+        let bvh = build(triangles);
+        check(&bvh, triangles);
+        bvh
+    }
+
     #[test]
     fn small_and_large_soups() {
         for (seed, count) in [1, 2, 3, 4, 5, 8, 9, 100, 5000].into_iter().enumerate() {
-            let triangles = soup(count, seed as u64);
-            check(&build(&triangles), &triangles);
-            let boxes: Vec<Aabb> = triangles.iter().map(bounds_of).collect();
-            check(&build_balanced(&boxes), &triangles);
+            checked(&soup(count, seed as u64));
         }
     }
 
     #[test]
-    fn a_tree_of_a_soup_is_better_than_halves() {
+    fn reinsertion_improves_a_soup() {
         let triangles = soup(5000, 3);
         let boxes: Vec<Aabb> = triangles.iter().map(bounds_of).collect();
-        let (built, halves) = (cost(&build(&triangles).nodes), cost(&build_balanced(&boxes).nodes));
-        assert!(built < 0.9 * halves, "{built} {halves}");
+        let (plain, optimized) = (cost(&layout(&split(&boxes)).nodes), cost(&build(&triangles).nodes));
+        assert!(optimized < 0.98 * plain, "{optimized} {plain}");
     }
 
     #[test]
     fn coincident_triangles() {
-        let triangles = vec![triangle([Vec3::ZERO, Vec3::X, Vec3::Y]); 2_000];
-        check(&build(&triangles), &triangles);
+        checked(&vec![triangle([Vec3::ZERO, Vec3::X, Vec3::Y]); 100_000]);
     }
 
     #[test]
-    fn hostile_sizes_stay_within_the_stack() {
-        // Each triangle encloses all before it: clustering makes a chain of them.
-        let triangles: Vec<Triangle> = (0..400)
-            .map(|i| {
-                let size = 1.1f32.powi(i);
-                triangle([Vec3::new(-size, -size, 0.0), Vec3::new(size, -size, 0.0), Vec3::new(0.0, size, size)])
-            })
-            .collect();
+    fn large_triangles_everywhere() {
+        let mut random = Random::new(4);
+        let corner = |random: &mut Random| random.in_box(Vec3::NEG_ONE, Vec3::ONE);
+        let triangles: Vec<Triangle> = (0..30_000).map(|_| triangle([0; 3].map(|_| corner(&mut random)))).collect();
+        checked(&triangles);
+    }
+
+    /// Each triangle encloses all before it, or lies ever farther out: one falls off at every split.
+    #[test]
+    fn hostile_sizes_and_gaps_stay_within_the_stack() {
+        let nested = |i: i32| {
+            let size = 1.1f32.powi(i);
+            triangle([Vec3::new(-size, -size, 0.0), Vec3::new(size, -size, 0.0), Vec3::new(0.0, size, size)])
+        };
+        checked(&(0..200).map(nested).collect::<Vec<_>>());
+        let apart = |i: i32| {
+            let at = Vec3::X * 20f32.powi(i / 8);
+            triangle([at, at * 1.001, at + 0.001 * at.length() * Vec3::Y])
+        };
+        let triangles: Vec<Triangle> = (-230..48).map(apart).collect();
+        checked(&triangles);
         let boxes: Vec<Aabb> = triangles.iter().map(bounds_of).collect();
-        assert!(layout(&cluster(&boxes)).depth > MAX_DEPTH, "not hostile enough to test the fallback");
-        check(&build(&triangles), &triangles);
+        assert!(layout(&split(&boxes)).depth > HALVES_FROM, "not hostile enough to reach the halves");
     }
 }

@@ -10,6 +10,7 @@ pub mod environment;
 pub mod flat;
 pub mod gltf;
 pub mod gpu_types;
+pub mod intersect;
 pub mod octahedral;
 pub mod random;
 pub mod shapes;

@@ -74,7 +74,7 @@ fn check(mesh: &Mesh, materials: usize) -> std::result::Result<(), String> {
             return Err(format!("{count} {name} for {positions} positions"));
         }
     }
-    if mesh.indices.len() % 3 != 0 {
+    if !mesh.indices.len().is_multiple_of(3) {
         return Err(format!("{} indices do not make whole triangles", mesh.indices.len()));
     }
     if let Some(index) = mesh.indices.iter().find(|&&index| index as usize >= positions) {
