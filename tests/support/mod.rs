@@ -1,6 +1,10 @@
 //! What the GPU tests share: one device a test binary, scenes in small pictures, and statistics.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+pub mod harness;
+pub mod statistics;
+pub mod twins;
+
 use restir::{FlatScene, Gpu, GpuOptions, Image, Renderer, Scene};
 
 /// A device within WebGPU's default limits: what passes here runs everywhere.
