@@ -8,6 +8,7 @@ pub mod film;
 pub mod frame;
 pub mod gpu;
 pub mod gpu_scene;
+pub mod lab;
 pub mod output;
 pub mod params;
 pub mod renderer;

@@ -108,7 +108,7 @@ impl Blit {
             pass.draw(0..3, 0..1);
         }
         gpu.queue.submit([encoder.finish()]);
-        texture.present();
+        gpu.queue.present(texture);
         Ok(())
     }
 }

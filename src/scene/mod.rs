@@ -7,17 +7,25 @@ pub mod alias;
 pub mod builtin;
 pub mod bvh;
 pub mod environment;
+#[cfg(not(target_arch = "wasm32"))]
+mod files;
 pub mod flat;
 pub mod gltf;
 pub mod gpu_types;
 pub mod intersect;
+mod lights;
 pub mod octahedral;
 pub mod random;
 pub mod shapes;
+pub mod tangents;
 
 pub use flat::FlatScene;
 
 use glam::{Mat4, Vec2, Vec3, Vec4};
+
+/// Farther from the origin than this, in metres, products of three lengths no longer fit in f32: such positions are not
+/// used.
+const MAX_COORDINATE: f32 = 1e9;
 
 /// A scene as a person thinks of it. Lengths in metres, Y up, right-handed; colours linear Rec. 709.
 #[derive(Debug, Clone, Default)]

@@ -1,1 +1,56 @@
-fn main() {}
+//! The command line: render, compare, and ask what there is.
+
+mod bench;
+mod compare;
+mod failure;
+mod info;
+mod options;
+mod progress;
+mod render;
+mod report;
+mod scene;
+mod scenes;
+mod session;
+mod techniques;
+
+use clap::{Parser, Subcommand};
+use failure::Result;
+use std::process::ExitCode;
+
+/// ReSTIR on this machine's GPU, or on its CPU through a software Vulkan driver.
+///
+/// Exit code: 0 done, 1 failed, 2 wrong usage. Errors are one line on stderr: error[CODE]: what.
+#[derive(Parser)]
+#[command(name = "restir", version, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Render(render::Args),
+    Compare(compare::Args),
+    Techniques(techniques::Args),
+    Scenes(scenes::Args),
+    Info(info::Args),
+    Bench(bench::Args),
+}
+
+fn run(command: Command) -> Result<()> {
+    match command {
+        Command::Render(args) => render::run(&args),
+        Command::Compare(args) => compare::run(&args),
+        Command::Techniques(args) => techniques::run(&args),
+        Command::Scenes(args) => scenes::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Bench(args) => bench::run(&args),
+    }
+}
+
+fn main() -> ExitCode {
+    match run(Cli::parse().command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(),
+    }
+}

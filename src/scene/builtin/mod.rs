@@ -1,6 +1,10 @@
 //! Procedural, seeded scenes.
 
 mod cornell;
+mod furnace;
+mod glossy_spheres;
+mod many_lights;
+mod veach_mis;
 
 use super::{Instance, Material, Mesh, Scene};
 use crate::error::{Error, Result};
@@ -33,6 +37,30 @@ pub const ALL: &[BuiltinInfo] = &[
         doc: "The Cornell box with 64 coloured point lights that revolve round its vertical axis.",
         example: "cornell-64",
     },
+    BuiltinInfo {
+        name: "furnace",
+        title: "White furnace",
+        doc: "A white sphere in an even sky of radiance 1: a renderer that loses no light hardly shows it.",
+        example: "furnace",
+    },
+    BuiltinInfo {
+        name: "veach-mis",
+        title: "Veach's plates",
+        doc: "Four steel plates of growing roughness under four spherical lights of equal power.",
+        example: "veach-mis",
+    },
+    BuiltinInfo {
+        name: "many-lights",
+        title: "Hall of many lights",
+        doc: "A closed hall with columns, lit by N coloured triangles (1 to 1,000,000) that together always give the same light.",
+        example: "many-lights:10000",
+    },
+    BuiltinInfo {
+        name: "glossy-spheres",
+        title: "Glossy spheres",
+        doc: "Spheres from smooth to rough and from plastic to metal, under three panels and a dim sky.",
+        example: "glossy-spheres",
+    },
 ];
 
 /// Makes a built-in scene; the same name gives the same scene.
@@ -40,9 +68,15 @@ pub const ALL: &[BuiltinInfo] = &[
 /// # Errors
 /// [`Error::Unknown`] for a name that is not in [`ALL`]; [`Error::BadValue`] for a bad number after the `:`.
 pub fn make(name: &str) -> Result<Scene> {
+    if let Some(count) = name.strip_prefix("many-lights:") {
+        return many_lights::many_lights(count);
+    }
     match name {
         "cornell" => Ok(cornell::cornell()),
         "cornell-64" => Ok(cornell::cornell_64()),
+        "furnace" => Ok(furnace::furnace()),
+        "veach-mis" => Ok(veach_mis::veach_mis()),
+        "glossy-spheres" => Ok(glossy_spheres::glossy_spheres()),
         _ => Err(Error::Unknown {
             kind: "built-in scene",
             name: name.to_owned(),

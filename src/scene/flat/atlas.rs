@@ -12,6 +12,8 @@ const MAX_SIDE: u32 = 8192;
 const MAX_LAYERS: u32 = 256;
 const MIN_SIDE: u32 = 4;
 const TEXEL_BYTES: usize = 4;
+/// Most bytes of all layers: far from what the address space can hold.
+const MAX_BYTES: u64 = if cfg!(target_pointer_width = "32") { 1 << 30 } else { 1 << 33 };
 
 /// Where a texture lies in the atlas.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -55,13 +57,13 @@ pub(super) fn pack(scene: &Scene, warnings: &mut Vec<String>) -> Result<(Atlas, 
         size *= 2;
         (places, layers) = shelves(&pictures, size);
     }
+    let limit = |wanted, had, unit| Err(Error::Limit { what: "the texture atlas".into(), wanted, had, unit });
     if layers > MAX_LAYERS {
-        return Err(Error::Limit {
-            what: "the texture atlas".into(),
-            wanted: u64::from(layers),
-            had: u64::from(MAX_LAYERS),
-            unit: "layers",
-        });
+        return limit(u64::from(layers), u64::from(MAX_LAYERS), "layers");
+    }
+    let bytes = u64::from(size).pow(2) * u64::from(layers) * TEXEL_BYTES as u64;
+    if bytes > MAX_BYTES {
+        return limit(bytes, MAX_BYTES, "bytes");
     }
     let texels = draw(&pictures, &places, size, layers);
     let rectangles = picture_of_texture.into_iter().filter_map(|index| places.get(index).copied()).collect();

@@ -1,12 +1,14 @@
 //! A scene as plain arrays with a BVH: what is uploaded, sent from a Worker to the page, and kept to rebuild a lost device.
 
 mod atlas;
+mod bytes;
 mod lights;
 mod materials;
 mod triangles;
+mod validate;
 
 use super::gpu_types::{BvhNode, EnvironmentTexel, Light, Material, NONE, Triangle};
-use super::{Camera, LightMotion, Projection, PunctualKind, Scene, bvh};
+use super::{Camera, LightMotion, MAX_COORDINATE, Projection, PunctualKind, Scene, bvh};
 use crate::error::{Error, Result};
 use glam::{Vec3, Vec4};
 
@@ -200,7 +202,10 @@ const POINT: Triangle = Triangle {
 fn bounds(nodes: &[BvhNode], scene: &Scene) -> [Vec3; 2] {
     let root = nodes.first().map_or([Vec3::ZERO; 2], |root| [root.min, root.max]);
     let placed = scene.lights.iter().filter(|light| light.kind != PunctualKind::Directional);
-    placed.fold(root, |[min, max], light| [min.min(light.position), max.max(light.position)])
+    let reach = Vec3::splat(MAX_COORDINATE);
+    placed
+        .map(|light| light.position.clamp(-reach, reach))
+        .fold(root, |[min, max], position| [min.min(position), max.max(position)])
 }
 
 /// The scene's usable cameras, or one that frames its bounds from the front and a little above.

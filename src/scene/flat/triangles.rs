@@ -4,13 +4,11 @@ use crate::error::{Error, Result};
 use crate::scene::gpu_types::{
     NONE, TRIANGLE_ALPHA_MASK, TRIANGLE_BITANGENT_SHIFT, TRIANGLE_DOUBLE_SIDED, TRIANGLE_TANGENTS, Triangle,
 };
-use crate::scene::{AlphaMode, Instance, Mesh, Scene, octahedral};
+use crate::scene::{AlphaMode, Instance, MAX_COORDINATE, Mesh, Scene, octahedral};
 use glam::{Mat3, Vec2, Vec3, Vec4};
 
-/// Most triangles after instancing: 2 GiB of them.
-const MAX_TRIANGLES: u64 = 1 << 24;
-/// Farther out, products of three lengths no longer fit in f32, in metres.
-const MAX_COORDINATE: f32 = 1e9;
+/// Most triangles after instancing: 2 GiB of them, or 512 MiB where addresses are short.
+const MAX_TRIANGLES: u64 = if cfg!(target_pointer_width = "32") { 1 << 22 } else { 1 << 24 };
 /// Twice the area below which a triangle has none, in square metres: its square would be denormal.
 const MIN_TWICE_AREA: f32 = 1e-18;
 

@@ -1,0 +1,52 @@
+// npm test: everything. One line per step; the first failure ends the run with its output.
+import { softwareEnvironment } from './environment.mjs';
+import { build } from './build.mjs';
+import { run, script, step } from './run.mjs';
+import { setup } from './setup.mjs';
+
+const lastLine = (output) => output.trim().split('\n').at(-1);
+
+/** Adds up the `test result:` lines of all test binaries. */
+function rustSummary(output) {
+  const total = (word) => [...output.matchAll(new RegExp(`(\\d+) ${word}`, 'g'))].reduce((sum, [, count]) => sum + Number(count), 0);
+  return `${total('passed')} passed`;
+}
+
+/** Node's test runner ends with `# pass N` among its counts. */
+const nodeSummary = (output) => `${/^. pass (\d+)/m.exec(output)?.[1] ?? 0} passed`;
+
+const browserTests = (browser, env) => async () =>
+  nodeSummary(await run(['node', '--test', '--test-reporter=spec', 'tests/browser/page.test.mjs'], { env: { ...env, BROWSER: browser } }));
+
+function steps() {
+  const env = softwareEnvironment();
+  const cargo = async (...words) => {
+    await run(['cargo', ...words], { env });
+  };
+  return [
+    ['format', () => cargo('fmt', '--check')],
+    ['clippy', () => cargo('clippy', '--all-targets', '--', '-D', 'warnings')],
+    ['clippy, wasm', () => cargo('clippy', '--lib', '--target', 'wasm32-unknown-unknown', '--', '-D', 'warnings')],
+    ['rust tests', async () => rustSummary(await run(['cargo', 'test'], { env }))],
+    ['tint', async () => lastLine(await run(['node', 'scripts/tint.mjs']))],
+    ['page', () => build()],
+    ['types', () => run(['tsc', '--project', '.']).then(() => undefined)],
+    ['chromium', browserTests('chromium', env)],
+    ['firefox', browserTests('firefox', env)],
+  ];
+}
+
+await script(async () => {
+  await setup('test');
+  let passed = 0;
+  try {
+    for (const [name, work] of steps()) {
+      await step(name, work);
+      passed += 1;
+    }
+  } catch (error) {
+    console.error(error.message);
+    process.exitCode = 1;
+  }
+  console.log(`${passed} passed, ${process.exitCode ? 1 : 0} failed`);
+});

@@ -1,0 +1,63 @@
+//! `restir info`: what a scene holds.
+
+use crate::failure::Result;
+use crate::{report, scene};
+use restir::scene::flat::SceneStats;
+
+/// Show what a scene holds: triangles, lights, bytes, the BVH, warnings.
+#[derive(clap::Args)]
+pub struct Args {
+    /// A .glb or .gltf file, or builtin:NAME (see `restir scenes`).
+    #[arg(value_name = "SCENE")]
+    scene: String,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(serde::Serialize)]
+struct Info {
+    name: String,
+    #[serde(flatten)]
+    stats: SceneStats,
+    cameras: Vec<String>,
+    moving_lights: usize,
+    /// Lowest and highest corner in metres.
+    bounds: [[f32; 3]; 2],
+    warnings: Vec<String>,
+}
+
+pub fn run(args: &Args) -> Result<()> {
+    let flat = scene::flatten(&scene::load(&args.scene)?)?;
+    let info = Info {
+        name: flat.name,
+        stats: flat.stats,
+        cameras: flat.cameras.into_iter().map(|camera| camera.name).collect(),
+        moving_lights: flat.motions.len(),
+        bounds: flat.bounds.map(|corner| corner.to_array()),
+        warnings: flat.warnings,
+    };
+    if args.json {
+        return report::json(&info);
+    }
+    report::warnings(&info.warnings);
+    report::text(&table(&info))
+}
+
+fn table(info: &Info) -> String {
+    let (stats, [low, high]) = (&info.stats, info.bounds);
+    [
+        format!("name       {}", info.name),
+        format!("triangles  {} (and {} dropped without area)", stats.triangles, stats.dropped_triangles),
+        format!("instances  {}", stats.instances),
+        format!("materials  {}", stats.materials),
+        format!("textures   {}", stats.textures),
+        format!("lights     {} ({} emissive triangles)", stats.lights, stats.emissive_triangles),
+        format!("moving     {} lights", info.moving_lights),
+        format!("cameras    {}", info.cameras.join(", ")),
+        format!("bounds     {low:?} to {high:?} m"),
+        format!("bvh        {} nodes, depth {}, cost {:.1}", stats.bvh_nodes, stats.bvh_depth, stats.bvh_cost),
+        format!("memory     {:.1} MiB on the GPU", stats.gpu_bytes as f64 / f64::from(1 << 20)),
+    ]
+    .join("\n")
+}

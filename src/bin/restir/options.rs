@@ -1,0 +1,64 @@
+//! Values of options, parsed.
+
+use glam::UVec2;
+use restir::output::MAX_SIDE;
+use restir::{Error, Result};
+
+/// `WIDTHxHEIGHT` in pixels, each 1 to [`MAX_SIDE`].
+pub fn size(text: &str) -> Result<UVec2> {
+    let bad = || Error::bad_value("size", format!("'{text}' is not WIDTHxHEIGHT, each a number from 1 to {MAX_SIDE}"));
+    let (width, height) = text.split_once(['x', 'X']).ok_or_else(bad)?;
+    let side = |text: &str| text.parse().ok().filter(|side| (1..=MAX_SIDE).contains(side)).ok_or_else(bad);
+    Ok(UVec2::new(side(width)?, side(height)?))
+}
+
+/// `key=value`.
+pub fn assignment(text: &str) -> Result<(String, String)> {
+    match text.split_once('=') {
+        Some((key, value)) if !key.is_empty() => Ok((key.to_owned(), value.to_owned())),
+        _ => Err(Error::bad_value("set", format!("'{text}' is not key=value"))),
+    }
+}
+
+/// A positive number of seconds.
+pub fn seconds(text: &str) -> Result<f64> {
+    let value = text.parse().ok().filter(|seconds: &f64| seconds.is_finite() && *seconds > 0.0);
+    value.ok_or_else(|| Error::bad_value("seconds", format!("'{text}' is not a number above 0")))
+}
+
+/// A picture file to write, by its extension.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Tone-mapped, for people.
+    Png,
+    /// Linear, for measurements.
+    Exr,
+}
+
+/// Where to write which kind of picture.
+#[derive(Debug, Clone)]
+pub struct OutFile {
+    pub path: std::path::PathBuf,
+    pub format: Format,
+}
+
+/// A path that ends in `.png` or `.exr`.
+pub fn out_file(text: &str) -> Result<OutFile> {
+    let path = std::path::PathBuf::from(text);
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let format = match extension.as_str() {
+        "png" => Format::Png,
+        "exr" => Format::Exr,
+        _ => return Err(Error::bad_value("out", format!("'{text}' ends neither in .png nor in .exr"))),
+    };
+    Ok(OutFile { path, format })
+}
+
+/// How long to render.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Length {
+    /// This many frames.
+    Frames(u32),
+    /// Until this many seconds have passed.
+    Seconds(f64),
+}

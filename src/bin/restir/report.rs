@@ -1,0 +1,40 @@
+//! What goes to stdout.
+
+use crate::failure::{Failure, Result};
+use serde::Serialize;
+use std::io::{ErrorKind, Write};
+
+/// Prints a line, or several.
+pub fn text(line: &str) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{line}").and_then(|()| out.flush()).map_err(|source| match source.kind() {
+        ErrorKind::BrokenPipe => Failure::OutputClosed,
+        _ => Failure::Failed(restir::Error::Io { path: "stdout".into(), source }),
+    })
+}
+
+/// Prints a value as indented JSON. Numbers that JSON has no word for (infinity) become null.
+pub fn json(value: &impl Serialize) -> Result<()> {
+    let rendered = serde_json::to_string_pretty(value)
+        .map_err(|error| Failure::Failed(restir::Error::Io { path: "stdout".into(), source: error.into() }))?;
+    text(&rendered)
+}
+
+/// Passes each warning on to stderr in one line.
+pub fn warnings<'a>(warnings: impl IntoIterator<Item = &'a String>) {
+    for warning in warnings {
+        eprintln!("warning: {warning}");
+    }
+}
+
+/// The middle value (the mean of the two middle ones); zero for none.
+pub fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.len() / 2;
+    match (sorted.get(middle), middle.checked_sub(1).and_then(|i| sorted.get(i))) {
+        (Some(high), Some(low)) if sorted.len().is_multiple_of(2) => 0.5 * (low + high),
+        (Some(middle), _) => *middle,
+        _ => 0.0,
+    }
+}

@@ -1,0 +1,142 @@
+//! A renderer set up from the command line, and the time its passes take: what `render` and `bench` share.
+
+use crate::failure::{Failure, Result};
+use crate::{options, report, scene};
+use glam::UVec2;
+use pollster::block_on;
+use restir::scene::flat::SceneStats;
+use restir::{Gpu, GpuOptions, Renderer, techniques};
+use std::time::Instant;
+
+/// What is rendered, and how.
+#[derive(clap::Args)]
+pub struct Options {
+    /// Technique id (see `restir techniques`).
+    #[arg(long, value_name = "ID", default_value = "restir-di")]
+    pub technique: String,
+    /// Set a parameter of the technique, or of a group, as film.exposure; may be given many times.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = options::assignment)]
+    pub set: Vec<(String, String)>,
+    /// Picture size in pixels.
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = options::size)]
+    pub size: UVec2,
+    /// Seed of all random numbers; the same seed on the same device gives the same picture.
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    pub seed: u32,
+    /// Camera of the scene, by index or name; the first where none is given.
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub camera: Option<String>,
+    /// Longest path in scattering events: 1 is direct light only. Lights seen directly are always drawn.
+    #[arg(long, value_name = "N")]
+    pub max_depth: Option<u32>,
+    #[command(flatten)]
+    pub lighting: scene::Lighting,
+}
+
+/// A scene on the GPU, ready to render.
+pub struct Session {
+    pub renderer: Renderer,
+    pub adapter: String,
+    pub scene: String,
+    pub camera: String,
+    pub stats: SceneStats,
+    /// Whether something in the scene moves.
+    pub moving: bool,
+    pub warnings: Vec<String>,
+    /// Rays of all frames measured.
+    pub rays: u64,
+    passes: Vec<Pass>,
+}
+
+/// Milliseconds a pass took in each frame.
+struct Pass {
+    name: String,
+    frames: Vec<f64>,
+}
+
+/// How long a pass took on the GPU.
+#[derive(Debug, serde::Serialize)]
+pub struct PassReport {
+    pub name: String,
+    /// Of the frames in which it ran.
+    pub median_ms: f64,
+    pub total_ms: f64,
+}
+
+impl Session {
+    /// Loads the scene and prepares the device. Warnings go to stderr.
+    pub fn open(name: &str, options: &Options) -> Result<Session> {
+        // A wrong name is told before long work.
+        techniques::find(&options.technique).map_err(Failure::from_option)?;
+        let mut scene = scene::load(name)?;
+        scene::light(&mut scene, &options.lighting, options.seed)?;
+        let flat = scene::flatten(&scene)?;
+        report::warnings(&flat.warnings);
+        let camera = scene::camera(&flat.cameras, options.camera.as_deref())?.clone();
+        let (scene, stats, warnings) = (flat.name.clone(), flat.stats.clone(), flat.warnings.clone());
+        let moving = !flat.motions.is_empty();
+
+        let gpu = block_on(Gpu::headless(&GpuOptions { default_limits: false }))?;
+        let adapter = gpu.adapter_name();
+        let mut renderer = Renderer::new(gpu, flat, options.size)?;
+        renderer.set_technique(&options.technique).map_err(Failure::from_option)?;
+        if let Some(depth) = options.max_depth {
+            renderer.set("render.max_depth", &depth.to_string()).map_err(Failure::from_option)?;
+        }
+        for (key, value) in &options.set {
+            renderer.set(key, value).map_err(Failure::from_option)?;
+        }
+        renderer.set_camera(&camera);
+        renderer.set_seed(options.seed);
+        Ok(Session {
+            renderer,
+            adapter,
+            scene,
+            camera: camera.name,
+            stats,
+            moving,
+            warnings,
+            rays: 0,
+            passes: Vec::new(),
+        })
+    }
+
+    /// Renders one frame and waits until it is done. Gives its milliseconds from recording to end.
+    pub fn frame(&mut self) -> Result<f64> {
+        let start = Instant::now();
+        self.renderer.render_frame()?;
+        block_on(self.renderer.wait())?;
+        Ok(1e3 * start.elapsed().as_secs_f64())
+    }
+
+    /// [`Session::frame`], then notes how many rays it took and how long each pass was.
+    pub fn measured_frame(&mut self) -> Result<f64> {
+        let milliseconds = self.frame()?;
+        self.rays += block_on(self.renderer.counters())?.rays;
+        let mut seen: Vec<&str> = Vec::new();
+        for time in block_on(self.renderer.pass_times())? {
+            let index = self.passes.iter().position(|pass| pass.name == time.name).unwrap_or_else(|| {
+                self.passes.push(Pass { name: time.name.to_owned(), frames: Vec::new() });
+                self.passes.len() - 1
+            });
+            let frames = &mut self.passes[index].frames;
+            // A pass that runs several times in a frame counts once, with all its time.
+            match frames.last_mut() {
+                Some(last) if seen.contains(&time.name) => *last += time.ms,
+                _ => frames.push(time.ms),
+            }
+            seen.push(time.name);
+        }
+        Ok(milliseconds)
+    }
+
+    /// Time of each pass over all measured frames.
+    pub fn pass_reports(&self) -> Vec<PassReport> {
+        let report = |pass: &Pass| PassReport {
+            name: pass.name.clone(),
+            median_ms: report::median(&pass.frames),
+            total_ms: pass.frames.iter().sum(),
+        };
+        self.passes.iter().map(report).collect()
+    }
+}

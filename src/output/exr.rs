@@ -1,0 +1,294 @@
+//! OpenEXR, for measurements: linear Rec. 709, 32-bit float, with how the picture was made in the header.
+
+use super::{Image, MAX_SIDE, check_size};
+use crate::error::{Error, Result};
+use ::exr::block::reader::ChunksReader;
+use ::exr::block::{self, UncompressedBlock};
+use ::exr::image::write::WritableImage;
+use ::exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image as ExrImage, Layer};
+use ::exr::math::Vec2;
+use ::exr::meta::attribute::{Chromaticities, Compression, LineOrder, SampleType};
+use ::exr::meta::header::{Header, LayerAttributes};
+use std::io::Cursor;
+use std::path::Path;
+
+/// A picture and what is known of it, for [`encode_exr`].
+#[derive(Debug, Clone, Copy)]
+pub struct ExrPicture<'a> {
+    /// Channels `R`, `G`, `B`.
+    pub image: &'a Image,
+    /// Linear Rec. 709 albedo of the first surface: channels `albedo.R`, `albedo.G`, `albedo.B`.
+    pub albedo: Option<&'a [[f32; 3]]>,
+    /// World-space unit shading normal of the first surface: channels `normal.X`, `normal.Y`, `normal.Z`.
+    pub normal: Option<&'a [[f32; 3]]>,
+    /// Distance to the first surface in metres: channel `depth.Z`.
+    pub depth: Option<&'a [f32]>,
+    /// Technique id: attribute `restir.technique`.
+    pub technique: &'a str,
+    /// Every parameter as JSON text: attribute `restir.parameters`.
+    pub parameters: &'a str,
+    /// Attribute `restir.seed`.
+    pub seed: u32,
+    /// Frames rendered: attribute `restir.frames`.
+    pub frames: u32,
+}
+
+/// Encodes a picture losslessly (ZIP). The same picture gives the same bytes.
+///
+/// All attributes of our own are strings (numbers in decimal); `restir.version` is the version of this crate, and
+/// `chromaticities` are those of Rec. 709.
+///
+/// # Errors
+/// [`Error::BadValue`] where a channel does not fill the picture.
+pub fn encode_exr(picture: &ExrPicture) -> Result<Vec<u8>> {
+    let Image { width, height, pixels } = picture.image;
+    let size = Vec2(*width as usize, *height as usize);
+    let check = |name: &str, count: usize| check_size(name, *width, *height, count);
+    let mut channels = Vec::new();
+    let mut add = |name: &str, samples: Vec<f32>| channels.push(AnyChannel::new(name, FlatSamples::F32(samples)));
+    let component = |triples: &[[f32; 3]], i: usize| triples.iter().map(|t| t[i]).collect::<Vec<f32>>();
+
+    check("EXR", pixels.len())?;
+    for (i, name) in ["R", "G", "B"].into_iter().enumerate() {
+        add(name, component(pixels, i));
+    }
+    if let Some(albedo) = picture.albedo {
+        check("EXR albedo", albedo.len())?;
+        for (i, name) in ["albedo.R", "albedo.G", "albedo.B"].into_iter().enumerate() {
+            add(name, component(albedo, i));
+        }
+    }
+    if let Some(normal) = picture.normal {
+        check("EXR normal", normal.len())?;
+        for (i, name) in ["normal.X", "normal.Y", "normal.Z"].into_iter().enumerate() {
+            add(name, component(normal, i));
+        }
+    }
+    if let Some(depth) = picture.depth {
+        check("EXR depth", depth.len())?;
+        add("depth.Z", depth.to_vec());
+    }
+
+    let encoding = Encoding { line_order: LineOrder::Increasing, ..Encoding::SMALL_LOSSLESS };
+    let channels = AnyChannels::sort(channels.into_iter().collect());
+    let mut file = ExrImage::from_layer(Layer::new(size, LayerAttributes::default(), encoding, channels));
+    file.attributes.chromaticities = Some(Chromaticities {
+        red: Vec2(0.64, 0.33),
+        green: Vec2(0.30, 0.60),
+        blue: Vec2(0.15, 0.06),
+        white: Vec2(0.3127, 0.3290),
+    });
+    let mut bytes = Vec::new();
+    file.write()
+        .non_parallel()
+        .to_buffered(Cursor::new(&mut bytes))
+        .map_err(|error| Error::bad_value("EXR", error.to_string()))?;
+    insert_attributes(
+        &bytes,
+        &[
+            ("restir.frames", &picture.frames.to_string()),
+            ("restir.parameters", picture.parameters),
+            ("restir.seed", &picture.seed.to_string()),
+            ("restir.technique", picture.technique),
+            ("restir.version", env!("CARGO_PKG_VERSION")),
+        ],
+    )
+    .ok_or_else(|| Error::bad_value("EXR", "the header is too large"))
+}
+
+/// Adds string attributes to the one header of an EXR file.
+///
+/// The exr crate keeps custom attributes in a hash map and writes them in an order that differs from run to run;
+/// inserted here, the same picture gives the same bytes. An attribute is `name 0 type 0 size value`; an empty name ends
+/// the header; the table of chunk offsets follows (OpenEXR, "File Layout").
+fn insert_attributes(file: &[u8], attributes: &[(&str, &str)]) -> Option<Vec<u8>> {
+    let mut inserted = Vec::new();
+    for (name, value) in attributes {
+        inserted.extend_from_slice(name.as_bytes());
+        inserted.extend_from_slice(b"\0string\0");
+        inserted.extend_from_slice(&i32::try_from(value.len()).ok()?.to_le_bytes());
+        inserted.extend_from_slice(value.as_bytes());
+    }
+    let end = header_end(file)?;
+    let mut out = Vec::with_capacity(file.len() + inserted.len());
+    out.extend_from_slice(file.get(..end)?);
+    out.extend_from_slice(&inserted);
+    out.push(0);
+    // The first chunk begins where the table ends.
+    let table = end + 1;
+    let first = u64::from_le_bytes(file.get(table..table + 8)?.try_into().ok()?);
+    let first = usize::try_from(first).ok()?;
+    for offset in file.get(table..first)?.chunks_exact(8) {
+        let offset = u64::from_le_bytes(offset.try_into().ok()?);
+        out.extend_from_slice(&(offset + inserted.len() as u64).to_le_bytes());
+    }
+    out.extend_from_slice(file.get(first..)?);
+    Some(out)
+}
+
+/// Where the zero byte that ends the header lies.
+fn header_end(file: &[u8]) -> Option<usize> {
+    let mut at = 8; // magic number and version
+    while *file.get(at)? != 0 {
+        for _ in 0..2 {
+            at += file.get(at..)?.iter().position(|&byte| byte == 0)? + 1;
+        }
+        let size = i32::from_le_bytes(file.get(at..at + 4)?.try_into().ok()?);
+        at = at.checked_add(4)?.checked_add(usize::try_from(size).ok()?)?;
+    }
+    Some(at)
+}
+
+/// A file may claim at most this many bytes of pixels a byte of its own: twice what deflate can do at best.
+const MAX_EXPANSION: u64 = 2064;
+
+/// The compressions that are read. The exr crate's decoders of B44 and DWA overflow or allocate without bound on hostile
+/// files, which no check of the header can prevent.
+const COMPRESSIONS: [Compression; 6] = [
+    Compression::Uncompressed,
+    Compression::RLE,
+    Compression::ZIP1,
+    Compression::ZIP16,
+    Compression::PIZ,
+    Compression::PXR24,
+];
+
+/// Reads the colour of an EXR file: channels `R`, `G`, `B`, or `Y` for grey, in 16- or 32-bit float, in any order, from
+/// the first part that has them. Other channels are passed over.
+///
+/// # Errors
+/// [`Error::Io`]; otherwise as [`decode_exr`].
+pub fn read_exr(path: &Path) -> Result<Image> {
+    let name = path.display().to_string();
+    let bytes = std::fs::read(path).map_err(|source| Error::Io { path: name.clone(), source })?;
+    decode_exr(&name, &bytes)
+}
+
+/// [`read_exr`] from memory; `name` is what errors call the file.
+///
+/// # Errors
+/// [`Error::BadFile`] for a broken file or one that claims more pixels than [`MAX_SIDE`] squared or than its bytes could
+/// hold (checked before anything is allocated for them); [`Error::Unsupported`] for deep or subsampled pixels and for B44 and DWA
+/// compression.
+pub fn decode_exr(name: &str, bytes: &[u8]) -> Result<Image> {
+    let bad = |place: &str, what: String| Error::bad_file(name, place, what);
+    let library = |place: &str, error: ::exr::error::Error| match error {
+        ::exr::error::Error::NotSupported(what) => Error::Unsupported { file: name.to_owned(), what: what.into() },
+        other => bad(place, other.to_string()),
+    };
+    if !bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+        return Err(bad("byte 0", "not an OpenEXR file".into()));
+    }
+    let reader = block::read(Cursor::new(bytes), false).map_err(|error| library("header", error))?;
+
+    let mut claimed = 0u64;
+    for header in reader.headers() {
+        let Vec2(width, height) = header.layer_size;
+        if width == 0 || height == 0 || width.max(height) > MAX_SIDE as usize {
+            return Err(bad("dataWindow", format!("{width}x{height} is not within 1x1 and {MAX_SIDE}x{MAX_SIDE}")));
+        }
+        if !COMPRESSIONS.contains(&header.compression) {
+            return Err(Error::Unsupported {
+                file: name.to_owned(),
+                what: format!("compression {}", header.compression),
+            });
+        }
+        claimed = claimed.saturating_add((width * height) as u64 * header.channels.bytes_per_pixel as u64);
+    }
+    if claimed > MAX_EXPANSION * bytes.len() as u64 {
+        return Err(bad("dataWindow", format!("{claimed} bytes of pixels cannot lie in {} bytes", bytes.len())));
+    }
+    let Some((part, colour)) = reader.headers().iter().enumerate().find_map(|(i, h)| Some((i, Colour::of(h)?))) else {
+        return Err(bad("channels", "neither R, G and B nor Y".into()));
+    };
+    for &channel in &colour.channels {
+        let description = &reader.headers()[part].channels.list[channel];
+        if description.sampling != Vec2(1, 1) {
+            return Err(Error::Unsupported { file: name.to_owned(), what: "a subsampled channel".into() });
+        }
+    }
+    let Vec2(width, height) = reader.headers()[part].layer_size;
+    let mut canvas = Canvas { width, pixels: vec![[0.0; 3]; width * height], filled: 0, colour };
+    reader
+        .all_chunks(true)
+        .map_err(|error| library("chunk table", error))?
+        .decompress_sequential(true, |meta, block| {
+            match meta.headers.get(block.index.layer) {
+                Some(header) if block.index.layer == part && block.index.level == Vec2(0, 0) => {
+                    canvas.draw(header, &block)
+                }
+                _ => Some(()),
+            }
+            .ok_or_else(|| ::exr::error::Error::Invalid("a chunk outside the picture".into()))
+        })
+        .map_err(|error| library("pixels", error))?;
+    if canvas.filled != width * height {
+        return Err(bad("pixels", format!("{} pixels of {}", canvas.filled, width * height)));
+    }
+    Ok(Image { width: width as u32, height: height as u32, pixels: canvas.pixels })
+}
+
+/// Which channels of a part are the picture's red, green and blue.
+struct Colour {
+    channels: [usize; 3],
+}
+
+impl Colour {
+    fn of(header: &Header) -> Option<Self> {
+        let find = |name: &str| header.channels.list.iter().position(|c| c.name.as_slice() == name.as_bytes());
+        let channels = match (find("R"), find("G"), find("B"), find("Y")) {
+            (Some(r), Some(g), Some(b), _) => [r, g, b],
+            (_, _, _, Some(y)) => [y; 3],
+            _ => return None,
+        };
+        Some(Colour { channels })
+    }
+}
+
+/// The picture being put together from blocks.
+struct Canvas {
+    width: usize,
+    pixels: Vec<[f32; 3]>,
+    filled: usize,
+    colour: Colour,
+}
+
+impl Canvas {
+    /// Copies a block into the picture; `None` where it does not lie inside or has too few bytes.
+    ///
+    /// A block holds its lines from the top, and within each line one run of native-endian samples a channel.
+    fn draw(&mut self, header: &Header, block: &UncompressedBlock) -> Option<()> {
+        let (Vec2(x0, y0), Vec2(columns, rows)) = (block.index.pixel_position, block.index.pixel_size);
+        let line_bytes = columns.checked_mul(header.channels.bytes_per_pixel)?;
+        if x0.checked_add(columns)? > self.width {
+            return None;
+        }
+        let mut sources = Vec::with_capacity(3);
+        for &wanted in &self.colour.channels {
+            let before = header.channels.list.get(..wanted)?;
+            let offset: usize = before.iter().map(|c| columns * c.sample_type.bytes_per_sample()).sum();
+            sources.push((offset, header.channels.list.get(wanted)?.sample_type));
+        }
+        for row in 0..rows {
+            let line = block.data.get(row * line_bytes..(row + 1) * line_bytes)?;
+            let start = y0.checked_add(row)?.checked_mul(self.width)?.checked_add(x0)?;
+            let target = self.pixels.get_mut(start..start + columns)?;
+            for (component, (offset, kind)) in sources.iter().enumerate() {
+                let samples = line.get(*offset..offset + columns * kind.bytes_per_sample())?;
+                for (pixel, sample) in target.iter_mut().zip(samples.chunks_exact(kind.bytes_per_sample())) {
+                    pixel[component] = decode_sample(*kind, sample)?;
+                }
+            }
+        }
+        self.filled += rows * columns;
+        Some(())
+    }
+}
+
+fn decode_sample(kind: SampleType, bytes: &[u8]) -> Option<f32> {
+    Some(match kind {
+        SampleType::F16 => ::exr::prelude::f16::from_ne_bytes(bytes.try_into().ok()?).to_f32(),
+        SampleType::F32 => f32::from_ne_bytes(bytes.try_into().ok()?),
+        SampleType::U32 => u32::from_ne_bytes(bytes.try_into().ok()?) as f32,
+    })
+}

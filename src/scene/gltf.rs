@@ -1,1 +1,0 @@
-//! The glTF 2.0 loader.

@@ -1,0 +1,173 @@
+//! Accessors: typed, strided, possibly sparse views of buffers.
+
+use super::buffers::{Buffers, range};
+use super::container::Document;
+use super::mesh::Budget;
+use crate::error::Result;
+use gltf::json::accessor::{Accessor, ComponentType, Type, sparse::Sparse};
+
+/// What an accessor may look like where it is used.
+pub(super) struct Shape {
+    types: &'static [Type],
+    components: &'static [ComponentType],
+}
+
+use ComponentType::{F32, U8, U16, U32};
+
+/// Positions and normals.
+pub(super) const VEC3: Shape = Shape { types: &[Type::Vec3], components: &[F32] };
+/// Tangents.
+pub(super) const VEC4: Shape = Shape { types: &[Type::Vec4], components: &[F32] };
+/// Texture coordinates; integers are normalised.
+pub(super) const TEXCOORD: Shape = Shape { types: &[Type::Vec2], components: &[F32, U8, U16] };
+/// Colours; integers are normalised.
+pub(super) const COLOR: Shape = Shape { types: &[Type::Vec3, Type::Vec4], components: &[F32, U8, U16] };
+/// Vertex indices.
+pub(super) const INDEX: Shape = Shape { types: &[Type::Scalar], components: &[U8, U16, U32] };
+
+/// The checked elements of one accessor.
+pub(super) struct Elements<'a> {
+    /// Number of elements.
+    pub count: usize,
+    component: ComponentType,
+    /// Bytes of one element.
+    size: usize,
+    stride: usize,
+    /// From the first element on; none means zeros.
+    base: Option<&'a [u8]>,
+    /// Ascending indices of replaced elements, and their tightly packed values.
+    sparse: Option<(Vec<u32>, &'a [u8])>,
+}
+
+impl<'a> Elements<'a> {
+    /// Opens accessor `index`, which must have one of the forms that `shape` allows. `place` is where it is referred to.
+    pub fn open(
+        document: &Document,
+        buffers: &'a Buffers,
+        budget: &mut Budget,
+        index: usize,
+        shape: &Shape,
+        place: &str,
+    ) -> Result<Self> {
+        let accessor = document.at(&document.root.accessors, index, "accessors", place)?;
+        let place = format!("{place} = accessors[{index}]");
+        let kind = document.valid(&accessor.type_, &place)?;
+        let component = document.valid(&accessor.component_type, &place)?.0;
+        if !shape.types.contains(&kind) || !shape.components.contains(&component) {
+            let what =
+                format!("elements are {kind:?} of {component:?}, not {:?} of {:?}", shape.types, shape.components);
+            return Err(document.bad(&place, what));
+        }
+        let size = component.size() * kind.multiplicity();
+        // Elements are counted with u32 indices; u32::MAX itself stays free.
+        let count = u32::try_from(accessor.count.0).ok().filter(|&count| count < u32::MAX);
+        let count =
+            count.ok_or_else(|| document.bad(&place, format!("count {} is absurd", accessor.count.0)))? as usize;
+        let (base, stride) = open_base(document, buffers, accessor, count, size, &place)?;
+        let sparse = match &accessor.sparse {
+            Some(sparse) => Some(open_sparse(document, buffers, budget, sparse, count, size, &place)?),
+            None => None,
+        };
+        Ok(Elements { count, component, size, stride, base, sparse })
+    }
+
+    /// The bytes of element `i`; none for an element that was never given a value.
+    fn bytes(&self, i: usize) -> Option<&[u8]> {
+        if let Some((indices, values)) = &self.sparse
+            && let Ok(found) = indices.binary_search(&(i as u32))
+        {
+            return values.get(found * self.size..)?.get(..self.size);
+        }
+        self.base?.get(i * self.stride..)?.get(..self.size)
+    }
+
+    /// Element `i` as floats, integers normalised (specification, section 3.6.2.2); components it lacks are `fill`.
+    pub fn vector<const N: usize>(&self, i: usize, fill: f32) -> [f32; N] {
+        let Some(bytes) = self.bytes(i) else {
+            return std::array::from_fn(|c| if c * self.component.size() < self.size { 0.0 } else { fill });
+        };
+        std::array::from_fn(|c| match (self.component, bytes.get(c * self.component.size()..).unwrap_or_default()) {
+            (U8, [a, ..]) => f32::from(*a) / 255.0,
+            (U16, [a, b, ..]) => f32::from(u16::from_le_bytes([*a, *b])) / 65_535.0,
+            (F32, [a, b, c, d, ..]) => f32::from_le_bytes([*a, *b, *c, *d]),
+            _ => fill,
+        })
+    }
+
+    /// Element `i` as an index.
+    pub fn index(&self, i: usize) -> u32 {
+        match self.bytes(i) {
+            Some([a]) => u32::from(*a),
+            Some([a, b]) => u32::from(u16::from_le_bytes([*a, *b])),
+            Some([a, b, c, d]) => u32::from_le_bytes([*a, *b, *c, *d]),
+            _ => 0,
+        }
+    }
+}
+
+/// The bytes from the first element on, and the stride, with every element inside its buffer view.
+fn open_base<'a>(
+    document: &Document,
+    buffers: &'a Buffers,
+    accessor: &Accessor,
+    count: usize,
+    size: usize,
+    place: &str,
+) -> Result<(Option<&'a [u8]>, usize)> {
+    let Some(view) = accessor.buffer_view else { return Ok((None, size)) };
+    let (bytes, stride) = buffers.view(document, view.value(), place)?;
+    let stride = stride.unwrap_or(size);
+    if stride < size {
+        return Err(document.bad(place, format!("stride {stride} is less than the {size} bytes of an element")));
+    }
+    let offset = accessor.byte_offset.unwrap_or_default().0;
+    let length = match count {
+        0 => Some(0),
+        _ => (count as u64 - 1).checked_mul(stride as u64).and_then(|bytes| bytes.checked_add(size as u64)),
+    };
+    let bytes_of_elements = length.and_then(|length| range(bytes, offset, length)).ok_or_else(|| {
+        let available = bytes.len();
+        let what = format!(
+            "{count} elements of {size} bytes, stride {stride}, from byte {offset} do not fit into the {available} \
+             bytes of bufferViews[{}]",
+            view.value()
+        );
+        document.bad(place, what)
+    })?;
+    Ok((Some(bytes_of_elements), stride))
+}
+
+/// Indices and values of a sparse accessor.
+fn open_sparse<'a>(
+    document: &Document,
+    buffers: &'a Buffers,
+    budget: &mut Budget,
+    sparse: &Sparse,
+    count: usize,
+    size: usize,
+    place: &str,
+) -> Result<(Vec<u32>, &'a [u8])> {
+    let place = format!("{place}.sparse");
+    let replaced = sparse.count.0;
+    if replaced > count as u64 {
+        return Err(document.bad(place, format!("it replaces {replaced} of {count} elements")));
+    }
+    budget.charge(document, replaced * 4)?;
+    let component = document.valid(&sparse.indices.component_type, &place)?.0;
+    let view_of = |view: usize, offset: u64, size: usize, name: &str| {
+        let (bytes, _) = buffers.view(document, view, &place)?;
+        range(bytes, offset, replaced * size as u64)
+            .ok_or_else(|| document.bad(&place, format!("its {name} lie outside bufferViews[{view}]")))
+    };
+    let indices = &sparse.indices;
+    let bytes = view_of(indices.buffer_view.value(), indices.byte_offset.0, component.size(), "indices")?;
+    let values = view_of(sparse.values.buffer_view.value(), sparse.values.byte_offset.0, size, "values")?;
+    let tight = component.size();
+    let elements = Elements { count, component, size: tight, stride: tight, base: Some(bytes), sparse: None };
+    let indices: Vec<u32> = (0..replaced as usize).map(|i| elements.index(i)).collect();
+    let ascending = indices.windows(2).all(|pair| pair[0] < pair[1]);
+    if !ascending || indices.last().is_some_and(|&last| last as usize >= count) {
+        return Err(document.bad(place, format!("its indices do not ascend or are not below {count}")));
+    }
+    Ok((indices, values))
+}

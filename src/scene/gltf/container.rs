@@ -1,0 +1,176 @@
+//! From bytes to typed JSON: the GLB container, the JSON itself, the version and the required extensions.
+
+use super::{SUPPORTED_EXTENSIONS, tidy};
+use crate::error::{Error, Result};
+use gltf::json::{Root, validation::Checked};
+
+/// Most JSON objects in a file: each may take a kilobyte once parsed.
+const MAX_JSON_OBJECTS: u64 = 1 << 20;
+/// Most JSON values outside of objects' own count.
+const MAX_JSON_VALUES: u64 = 1 << 23;
+
+/// A parsed file: its name, its JSON and its binary chunk.
+pub(super) struct Document<'a> {
+    /// The file as the caller named it.
+    pub file: &'a str,
+    /// Parsed but not validated: indices may point nowhere.
+    pub root: Root,
+    /// The BIN chunk of a GLB.
+    pub binary: Option<&'a [u8]>,
+}
+
+impl Document<'_> {
+    /// An [`Error::BadFile`] in this file.
+    pub fn bad(&self, place: impl Into<String>, what: impl Into<String>) -> Error {
+        Error::bad_file(self.file, place, what)
+    }
+
+    /// `amount` if it is at most `limit`.
+    pub fn within(&self, what: &str, amount: u64, limit: u64, unit: &'static str) -> Result<()> {
+        if amount <= limit {
+            return Ok(());
+        }
+        Err(Error::Limit { what: format!("{}: {what}", self.file), wanted: amount, had: limit, unit })
+    }
+
+    /// The value of an enumerated JSON property.
+    pub fn valid<T: Copy>(&self, value: &Checked<T>, place: &str) -> Result<T> {
+        match value {
+            Checked::Valid(value) => Ok(*value),
+            Checked::Invalid => Err(self.bad(place, "is none of the values that the specification lists")),
+        }
+    }
+
+    /// The element of `list` at `index`, or an error that says what is missing.
+    pub fn at<'l, T>(&self, list: &'l [T], index: usize, kind: &str, place: &str) -> Result<&'l T> {
+        list.get(index)
+            .ok_or_else(|| self.bad(place, format!("{kind}[{index}] does not exist: there are {}", list.len())))
+    }
+
+    /// `values` if all are finite.
+    pub fn finite<const N: usize>(&self, values: [f32; N], place: &str) -> Result<[f32; N]> {
+        if values.iter().all(|value| value.is_finite()) {
+            return Ok(values);
+        }
+        Err(self.bad(place, "is too large for a 32-bit float"))
+    }
+}
+
+/// Splits, parses and checks version and extensions.
+pub(super) fn parse<'a>(file: &'a str, bytes: &'a [u8]) -> Result<Document<'a>> {
+    let (json, binary) = if bytes.starts_with(b"glTF") { split_glb(file, bytes)? } else { (bytes, None) };
+    check_json_size(file, json)?;
+    check_header(file, json)?;
+    let root = serde_json::from_slice(json).map_err(|error| json_error(file, &error))?;
+    Ok(Document { file, root, binary })
+}
+
+/// Little-endian u32 at `offset`.
+fn u32_at(bytes: &[u8], offset: usize) -> Option<u32> {
+    let bytes = bytes.get(offset..offset.checked_add(4)?)?;
+    Some(u32::from_le_bytes(bytes.try_into().ok()?))
+}
+
+/// The JSON chunk and the BIN chunk of binary glTF (specification, section 4). Chunks of other types are skipped.
+fn split_glb<'a>(file: &str, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>)> {
+    let bad = |place: String, what: String| Error::bad_file(file, place, what);
+    let (Some(version), Some(length)) = (u32_at(bytes, 4), u32_at(bytes, 8)) else {
+        return Err(bad("GLB header".into(), format!("the file ends after {} of 12 bytes", bytes.len())));
+    };
+    if version != 2 {
+        return Err(Error::Unsupported { file: file.into(), what: format!("GLB version {version}") });
+    }
+    let length = length as usize;
+    let Some(contents) = bytes.get(12..length) else {
+        let what = format!("it says that the file has {length} bytes, but it has {}", bytes.len());
+        return Err(bad("GLB header".into(), what));
+    };
+    let (mut json, mut binary) = (None, None);
+    let mut rest = contents;
+    while !rest.is_empty() {
+        let place = format!("chunk at byte {}", length - rest.len());
+        let (Some(size), Some(kind)) = (u32_at(rest, 0), rest.get(4..8)) else {
+            return Err(bad(place, format!("{} bytes are too few for a chunk header", rest.len())));
+        };
+        let available = rest.len() - 8;
+        let Some(chunk) = rest.get(8..).and_then(|body| body.get(..size as usize)) else {
+            return Err(bad(place, format!("it says that it has {size} bytes, but {available} are left")));
+        };
+        match kind {
+            b"JSON" if json.is_none() => json = Some(chunk),
+            b"BIN\0" if json.is_some() && binary.is_none() => binary = Some(chunk),
+            _ if json.is_none() => return Err(bad(place, "the first chunk is not JSON".into())),
+            _ => {}
+        }
+        rest = rest.get(8 + size as usize..).unwrap_or_default();
+    }
+    let json = json.ok_or_else(|| bad("GLB header".into(), "there is no JSON chunk".into()))?;
+    Ok((json, binary))
+}
+
+/// Bounds what parsing can allocate: a few bytes of JSON such as `{},` become a kilobyte of structs.
+fn check_json_size(file: &str, json: &[u8]) -> Result<()> {
+    let (mut objects, mut values, mut in_string, mut escaped) = (0u64, 0u64, false, false);
+    for &byte in json {
+        if in_string {
+            in_string = escaped || byte != b'"';
+            escaped = !escaped && byte == b'\\';
+            continue;
+        }
+        match byte {
+            b'"' => in_string = true,
+            b'{' => objects += 1,
+            b',' => values += 1,
+            _ => {}
+        }
+    }
+    for (what, amount, limit) in [("objects", objects, MAX_JSON_OBJECTS), ("values", values, MAX_JSON_VALUES)] {
+        if amount > limit {
+            return Err(Error::Limit { what: format!("{file}: its JSON"), wanted: amount, had: limit, unit: what });
+        }
+    }
+    Ok(())
+}
+
+/// The part of the JSON that says whether the rest can be understood; read first, so that a file which needs more than
+/// this loader has is refused for that reason and not for what the missing extension leaves out.
+#[derive(serde::Deserialize)]
+struct Header {
+    asset: Asset,
+    #[serde(default, rename = "extensionsRequired")]
+    extensions_required: Vec<String>,
+}
+
+/// `asset` of [`Header`].
+#[derive(serde::Deserialize)]
+struct Asset {
+    version: String,
+    #[serde(rename = "minVersion")]
+    min_version: Option<String>,
+}
+
+/// Refuses other versions than 2.0 and extensions that are required but not supported.
+fn check_header(file: &str, json: &[u8]) -> Result<()> {
+    let header: Header = serde_json::from_slice(json).map_err(|error| json_error(file, &error))?;
+    let unsupported = |what: String| Err(Error::Unsupported { file: file.into(), what });
+    // A later minor version is readable unless it says otherwise in minVersion (specification, section 3.2).
+    let needed = header
+        .asset
+        .min_version
+        .as_deref()
+        .unwrap_or_else(|| if header.asset.version.starts_with("2.") { "2.0" } else { &header.asset.version });
+    if needed != "2.0" {
+        return unsupported(format!("glTF version {}", tidy(needed)));
+    }
+    match header.extensions_required.iter().find(|name| !SUPPORTED_EXTENSIONS.contains(&name.as_str())) {
+        Some(name) => unsupported(format!("required extension {}", tidy(name))),
+        None => Ok(()),
+    }
+}
+
+/// A JSON error with its line and column as the place.
+fn json_error(file: &str, error: &serde_json::Error) -> Error {
+    let text = error.to_string();
+    let what = text.rsplit_once(" at line ").map_or(text.as_str(), |(what, _)| what);
+    Error::bad_file(file, format!("JSON line {} column {}", error.line(), error.column()), tidy(what))
+}

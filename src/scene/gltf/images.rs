@@ -1,0 +1,97 @@
+//! PNG and JPEG images, decoded to RGBA8.
+
+use super::buffers::Buffers;
+use super::container::Document;
+use super::{MAX_IMAGE_BYTES, MAX_IMAGE_SIDE, Resolve, tidy, uri};
+use crate::error::{Error, Result};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use std::borrow::Cow;
+use std::io::Cursor;
+use std::sync::Arc;
+
+/// Most bytes a decoder may allocate for one image.
+const MAX_DECODER_BYTES: u64 = 512 << 20;
+
+/// One decoded image; shared by the textures that use it.
+#[derive(Clone)]
+pub(super) struct Image {
+    /// Width in texels.
+    pub width: u32,
+    /// Height in texels.
+    pub height: u32,
+    /// RGBA8, row-major from the top, as stored.
+    pub pixels: Arc<Vec<u8>>,
+}
+
+/// The images decoded so far.
+pub(super) struct Images {
+    decoded: Vec<Option<Image>>,
+    bytes: u64,
+}
+
+impl Images {
+    /// Nothing decoded yet.
+    pub fn new(document: &Document) -> Self {
+        Images { decoded: vec![None; document.root.images.len()], bytes: 0 }
+    }
+
+    /// Image `index`, decoded at its first use.
+    pub fn get(
+        &mut self,
+        document: &Document,
+        buffers: &Buffers,
+        resolve: Resolve,
+        index: usize,
+        place: &str,
+    ) -> Result<Image> {
+        let image = document.at(&document.root.images, index, "images", place)?;
+        if let Some(Some(decoded)) = self.decoded.get(index) {
+            return Ok(decoded.clone());
+        }
+        let place = format!("images[{index}]");
+        let file = match (image.buffer_view, &image.uri) {
+            (Some(view), _) => Cow::Borrowed(buffers.view(document, view.value(), &place)?.0),
+            (None, Some(uri)) => Cow::Owned(uri::fetch(document, &format!("{place}.uri"), uri, resolve)?),
+            (None, None) => return Err(document.bad(place, "it has neither a bufferView nor a uri")),
+        };
+        let decoded = self.decode(document, &file, &place)?;
+        if let Some(slot) = self.decoded.get_mut(index) {
+            *slot = Some(decoded.clone());
+        }
+        Ok(decoded)
+    }
+
+    /// Decodes `file`, whose format is told by its first bytes. The header's size is checked before anything is
+    /// allocated for it.
+    fn decode(&mut self, document: &Document, file: &[u8], place: &str) -> Result<Image> {
+        let broken = |error: image::ImageError| document.bad(place, tidy(&error.to_string()));
+        let format = match image::guess_format(file) {
+            Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) => format,
+            Ok(other) => {
+                let what = format!("image format {other:?} ({place})");
+                return Err(Error::Unsupported { file: document.file.into(), what });
+            }
+            Err(_) => return Err(document.bad(place, "it is neither PNG nor JPEG")),
+        };
+        let mut limits = Limits::default();
+        limits.max_image_width = Some(MAX_IMAGE_SIDE);
+        limits.max_image_height = Some(MAX_IMAGE_SIDE);
+        limits.max_alloc = Some(MAX_DECODER_BYTES);
+        let mut reader = ImageReader::with_format(Cursor::new(file), format);
+        reader.limits(limits);
+        let decoder = reader.into_decoder().map_err(broken)?;
+        let (width, height) = decoder.dimensions();
+        if width == 0 || height == 0 || width > MAX_IMAGE_SIDE || height > MAX_IMAGE_SIDE {
+            return Err(document.bad(place, format!("{width} x {height} texels; at most {MAX_IMAGE_SIDE} a side")));
+        }
+        if decoder.total_bytes() > MAX_DECODER_BYTES {
+            return Err(
+                document.bad(place, format!("{width} x {height} texels take more than {MAX_DECODER_BYTES} bytes"))
+            );
+        }
+        self.bytes += u64::from(width) * u64::from(height) * 4;
+        document.within("its decoded images", self.bytes, MAX_IMAGE_BYTES, "bytes")?;
+        let pixels = DynamicImage::from_decoder(decoder).map_err(broken)?.into_rgba8().into_raw();
+        Ok(Image { width, height, pixels: Arc::new(pixels) })
+    }
+}

@@ -1,0 +1,117 @@
+//! The glTF 2.0 loader: a `.glb` or `.gltf` file becomes a [`Scene`].
+//!
+//! Source: the glTF 2.0 specification and the extensions named in [`SUPPORTED_EXTENSIONS`]. Only the default scene's
+//! nodes are loaded (scene 0 where no default is named, every root node where there are no scenes). Occlusion textures
+//! are ignored, for light transport is computed; animations, skins and morph targets are not played (a warning says so).
+//!
+//! Nothing in a file is trusted: every size, count, offset and index is checked before it is used or allocated for, so
+//! the crate's typed JSON (`gltf::json`) is read directly rather than through its iterators, which panic.
+
+mod accessor;
+mod buffers;
+mod camera;
+mod container;
+mod images;
+mod lights;
+mod material;
+mod mesh;
+mod nodes;
+mod topology;
+mod uri;
+
+use super::Scene;
+use crate::error::Result;
+use container::Document;
+
+/// Extensions that a file may require.
+pub const SUPPORTED_EXTENSIONS: &[&str] =
+    &["KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_texture_transform"];
+
+/// Most triangles a scene may have once its instances are counted.
+pub const MAX_TRIANGLES: u64 = 50_000_000;
+/// Most placements of meshes a scene may have.
+pub const MAX_INSTANCES: u64 = 4_000_000;
+/// Most bytes of vertices and indices a scene may have before instancing.
+pub const MAX_GEOMETRY_BYTES: u64 = 2 << 30;
+/// Most bytes that all buffers of a file may have together; also the most for one file on disk.
+pub const MAX_BUFFER_BYTES: u64 = 2 << 30;
+/// Most bytes that all decoded images of a file may have together.
+pub const MAX_IMAGE_BYTES: u64 = 2 << 30;
+/// Longest side of an image in texels.
+pub const MAX_IMAGE_SIDE: u32 = 16_384;
+/// Most warnings that are kept one by one.
+const MAX_WARNINGS: usize = 100;
+
+/// Reads an external resource: it is given a relative path (percent-decoded, `/`-separated, without `..`).
+pub type Resolve<'r> = &'r mut dyn FnMut(&str) -> Result<Vec<u8>>;
+
+/// Loads a `.glb` or `.gltf` file; external buffers and images are read from beside it.
+///
+/// # Errors
+/// [`Error::Io`](crate::Error::Io) where a file cannot be read, else as [`load_bytes`].
+#[cfg(not(target_arch = "wasm32"))]
+pub fn load_file(path: &std::path::Path) -> Result<Scene> {
+    let folder = path.parent().unwrap_or(std::path::Path::new(""));
+    let bytes = crate::scene::files::read(path, MAX_BUFFER_BYTES)?;
+    load_bytes(&path.display().to_string(), &bytes, &mut |relative| {
+        crate::scene::files::read(&folder.join(relative), MAX_BUFFER_BYTES)
+    })
+}
+
+/// Loads glTF from memory; `name` is used in errors and, without folder and suffix, as the scene's name. Binary glTF is
+/// recognised by its magic. `resolve` is asked for what is neither embedded nor a `data:` URI; absolute paths, URLs
+/// and paths that leave the file's folder are refused before it is asked.
+///
+/// # Errors
+/// [`Error::BadFile`](crate::Error::BadFile) with the place for a broken file,
+/// [`Error::Unsupported`](crate::Error::Unsupported) for a required extension or a format this loader lacks,
+/// [`Error::Limit`](crate::Error::Limit) for a file beyond one of this module's limits, and what `resolve` returns.
+pub fn load_bytes(name: &str, bytes: &[u8], resolve: Resolve) -> Result<Scene> {
+    let document = container::parse(name, bytes)?;
+    let buffers = buffers::Buffers::load(&document, resolve)?;
+    let mut scene = Scene { name: scene_name(name), ..Scene::default() };
+    warn_of_unplayed(&document, &mut scene.warnings);
+    material::load(&document, &buffers, resolve, &mut scene)?;
+    nodes::load(&document, &buffers, &mut scene)?;
+    if scene.meshes.is_empty() {
+        scene.warnings.push("the scene has no triangles".into());
+    }
+    if scene.warnings.len() > MAX_WARNINGS {
+        let more = scene.warnings.len() - MAX_WARNINGS;
+        scene.warnings.truncate(MAX_WARNINGS);
+        scene.warnings.push(format!("and {more} more warnings"));
+    }
+    Ok(scene)
+}
+
+/// `folder/name.glb` is called `name`.
+fn scene_name(file: &str) -> String {
+    let base = file.rsplit(['/', '\\']).next().unwrap_or(file);
+    base.rsplit_once('.').map_or(base, |(stem, _)| stem).to_owned()
+}
+
+/// Says which parts of the file stand still.
+fn warn_of_unplayed(document: &Document, warnings: &mut Vec<String>) {
+    let root = &document.root;
+    for extension in root.extensions_used.iter().filter(|e| !SUPPORTED_EXTENSIONS.contains(&e.as_str())) {
+        warnings.push(format!("optional extension {} is ignored", tidy(extension)));
+    }
+    if !root.animations.is_empty() {
+        warnings.push(format!("{} animation(s) are not played", root.animations.len()));
+    }
+    if !root.skins.is_empty() {
+        warnings.push(format!("{} skin(s) are not applied: skinned meshes stand in their bind pose", root.skins.len()));
+    }
+    if root.meshes.iter().flat_map(|mesh| &mesh.primitives).any(|primitive| primitive.targets.is_some()) {
+        warnings.push("morph targets are not applied".into());
+    }
+}
+
+/// Text from a file made fit for a one-line message: no control characters, at most 120 characters.
+fn tidy(text: &str) -> String {
+    let mut line: String = text.chars().take(120).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    if text.chars().nth(120).is_some() {
+        line.push_str("...");
+    }
+    line
+}

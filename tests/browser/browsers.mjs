@@ -1,0 +1,48 @@
+// Starts the browser under test, as the toolchain notes found it to work without a GPU.
+import { mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import puppeteer from 'puppeteer-core';
+
+// Most other sets of switches compute, but lose the device when the canvas presents.
+const chromiumSwitches = [
+  '--no-sandbox',
+  '--enable-unsafe-webgpu',
+  '--enable-features=Vulkan',
+  '--use-vulkan=swiftshader',
+  '--use-angle=swiftshader',
+  '--disable-gpu-watchdog',
+  '--disable-quic',
+  '--no-first-run',
+  '--disable-background-networking',
+  '--disable-component-update',
+  '--disable-sync',
+];
+
+const launchers = {
+  chromium: (profile) =>
+    puppeteer.launch({ browser: 'chrome', executablePath: '/usr/bin/chromium', headless: true, userDataDir: profile, args: chromiumSwitches }),
+  // WebGPU on lavapipe: the Vulkan driver comes from the environment that npm test sets.
+  firefox: (profile) =>
+    puppeteer.launch({
+      browser: 'firefox',
+      executablePath: '/usr/bin/firefox-esr',
+      headless: true,
+      userDataDir: profile,
+      extraPrefsFirefox: { 'dom.webgpu.enabled': true, 'gfx.webgpu.ignore-blocklist': true },
+    }),
+};
+
+/** The browser that BROWSER names: chromium or firefox. */
+export const browserName = process.env.BROWSER ?? 'chromium';
+
+/** Starts it with an empty profile; `close` ends it and removes the profile. */
+export async function launch() {
+  const profile = mkdtempSync(join(tmpdir(), `restir-${browserName}-`));
+  const browser = await launchers[browserName](profile);
+  const close = async () => {
+    await browser.close();
+    rmSync(profile, { recursive: true, force: true, maxRetries: 5, retryDelay: 200 });
+  };
+  return { browser, close };
+}

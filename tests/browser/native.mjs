@@ -1,0 +1,19 @@
+// The same picture from the command line, on lavapipe.
+import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { run } from '../../scripts/run.mjs';
+import { softwareEnvironment } from '../../scripts/environment.mjs';
+import { decodePng } from './png.mjs';
+
+/** Renders with `restir render SCENE` and the given options; returns width, height and rgb. */
+export async function renderNatively(scene, options) {
+  const folder = mkdtempSync(join(tmpdir(), 'restir-native-'));
+  const file = join(folder, 'picture.png');
+  try {
+    await run(['cargo', 'run', '--quiet', '--', 'render', scene, ...options, '--out', file], { env: softwareEnvironment() });
+    return decodePng(readFileSync(file));
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+}

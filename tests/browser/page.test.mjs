@@ -1,0 +1,200 @@
+// The page in a real browser: it boots, shows the picture that the command line renders, and says what is wrong.
+import { strict as assert } from 'node:assert';
+import { after, before, test } from 'node:test';
+import { browserName } from './browsers.mjs';
+import { renderNatively } from './native.mjs';
+import { assertNoProblems, contrast, openPage, openSite, readDisplay, waitForFrames, waitForMessage } from './pages.mjs';
+
+let site;
+before(async () => (site = await openSite()));
+after(() => site.close());
+
+/** Runs `work` on the page opened with `query`; it must end without a problem on the console. */
+async function withPage(query, work, prepare) {
+  const { page, problems } = await openPage(site, query, prepare);
+  try {
+    await work(page);
+    assertNoProblems(problems);
+  } finally {
+    await page.close();
+  }
+}
+
+// First, while nothing is cached.
+test('shows a first picture of cornell within 5 s of navigation', { skip: browserName !== 'chromium' }, () =>
+  withPage('', async (page) => {
+    await waitForFrames(page, 1);
+    const milliseconds = await page.evaluate(() => performance.getEntriesByName('picture')[0].startTime);
+    assert.ok(milliseconds < 5000, `first picture after ${milliseconds.toFixed(0)} ms`);
+    const state = await page.evaluate(() => ({ status: document.getElementById('status').textContent, loading: document.getElementById('loading').hidden }));
+    assert.match(state.status, /\d+ frames? · .* ms/);
+  }));
+
+// Two drivers never agree in every bit: a ray that grazes an edge takes another path. Nearly all pixels must
+// agree to within a rounding step of the display, and what differs must not shift the mean.
+const closeBytes = 2;
+const closeShare = 0.98;
+const meanDifference = 0.5;
+
+function assertSamePicture(actual, expected) {
+  assert.equal(actual.length, expected.length);
+  let [close, signed] = [0, 0];
+  for (const [at, value] of actual.entries()) {
+    if (Math.abs(value - expected[at]) <= closeBytes) close += 1;
+    signed += value - expected[at];
+  }
+  const [share, shift] = [close / actual.length, signed / actual.length];
+  assert.ok(share >= closeShare, `${(100 * share).toFixed(2)} % of the values agree within ${closeBytes}`);
+  assert.ok(Math.abs(shift) <= meanDifference, `the mean is off by ${shift.toFixed(2)}`);
+}
+
+for (const technique of ['path-tracer', 'restir-di']) {
+  test(`${technique}: the displayed pixels are those of the command line`, () =>
+    withPage(`?scene=cornell&technique=${technique}&size=64x48&frames=4&seed=1`, async (page) => {
+      await waitForFrames(page, 4);
+      const picture = await readDisplay(page);
+      assert.ok(contrast(picture, 64, 48) > 40, 'the picture is flat');
+      const options = ['--technique', technique, '--size', '64x48', '--frames', '4', '--seed', '1'];
+      const native = await renderNatively('builtin:cornell', options);
+      assertSamePicture(picture, native.rgb);
+    }));
+}
+
+test('switches scene, technique and size, and keeps the address up to date', () =>
+  withPage('?scene=cornell&technique=normals&size=32x32&frames=2', async (page) => {
+    await waitForFrames(page, 2);
+    const normals = await readDisplay(page);
+
+    await page.select('#technique', 'path-tracer');
+    await page.waitForFunction(() => location.search.includes('technique=path-tracer'), { polling: 50 });
+    await waitForFrames(page, 2);
+    const paths = await readDisplay(page);
+    assert.notDeepEqual(paths, normals);
+
+    await page.select('#scene', 'furnace');
+    await page.waitForFunction(() => location.search.includes('scene=furnace'), { polling: 50 });
+    await waitForFrames(page, 2);
+    assert.notDeepEqual(await readDisplay(page), paths);
+
+    await page.evaluate(() => window.restir.call((viewer) => viewer.resize(48, 24)));
+    await page.click('#reset');
+    await waitForFrames(page, 1);
+    assert.equal((await readDisplay(page)).length, 48 * 24 * 3);
+  }));
+
+test('follows the window', () =>
+  withPage('?scene=cornell&technique=normals&scale=0.25', async (page) => {
+    await waitForFrames(page, 1);
+    await page.setViewport({ width: 400, height: 200 });
+    await page.waitForFunction(() => document.getElementById('status').textContent.includes('100×50'), { polling: 50 });
+    assert.equal((await readDisplay(page)).length, 100 * 50 * 3);
+  }));
+
+test('a parameter in the panel changes the picture and the address', () =>
+  withPage('?scene=cornell&technique=path-tracer&size=32x32&frames=1', async (page) => {
+    await waitForFrames(page, 1);
+    const bright = await readDisplay(page);
+    const set = (text) =>
+      page.evaluate((value) => {
+        const input = document.getElementById('parameter-film.exposure');
+        input.value = value;
+        input.dispatchEvent(new Event('change'));
+      }, text);
+    await set('-4');
+    await page.waitForFunction(() => location.search.includes('film.exposure=-4'), { polling: 50 });
+    const dark = await readDisplay(page);
+    const sum = (bytes) => bytes.reduce((total, byte) => total + byte, 0);
+    assert.ok(sum(dark) < sum(bright) / 2);
+    await set('0');
+    await page.waitForFunction(() => !location.search.includes('exposure'), { polling: 50 });
+    assert.deepEqual(await readDisplay(page), bright);
+  }));
+
+test('dragging orbits, and pausing stops', () =>
+  withPage('?scene=cornell&technique=normals&size=32x32', async (page) => {
+    await waitForFrames(page, 1);
+    await page.click('#pause');
+    const still = await readDisplay(page);
+    const frames = () => page.evaluate(() => window.restir.call((viewer) => viewer.frames()));
+    const before = await frames();
+    await page.evaluate(() => new Promise((resolve) => setTimeout(resolve, 200)));
+    assert.equal(await frames(), before);
+    await page.mouse.move(100, 100);
+    await page.mouse.down();
+    await page.mouse.move(160, 120, { steps: 3 });
+    await page.mouse.up();
+    await page.waitForFunction(() => location.search.includes('pose='), { polling: 50 });
+    assert.notDeepEqual(await readDisplay(page), still);
+  }));
+
+test('an unknown key in the address is a warning, and the picture appears', () =>
+  withPage('?scene=cornell&technique=normals&size=16x16&frames=1&candidatez=3', async (page) => {
+    await waitForFrames(page, 1);
+    const warnings = await page.evaluate(() => document.getElementById('warnings').textContent);
+    assert.match(warnings, /1 warning/);
+    assert.match(warnings, /candidatez/);
+  }));
+
+/** Drops one file on the page, as a person would. */
+const drop = (page, name, text) =>
+  page.evaluate(
+    (fileName, content) => {
+      const dataTransfer = new DataTransfer();
+      dataTransfer.items.add(new File([content], fileName));
+      document.body.dispatchEvent(new DragEvent('drop', { dataTransfer, bubbles: true, cancelable: true }));
+    },
+    name,
+    text,
+  );
+
+test('a broken .glb is named, and the former scene stays', () =>
+  withPage('?scene=cornell&technique=normals&size=16x16&frames=1', async (page) => {
+    await waitForFrames(page, 1);
+    const before = await readDisplay(page);
+    await drop(page, 'broken.glb', 'this is no glTF');
+    const message = await waitForMessage(page);
+    assert.match(message, /broken\.glb/);
+    await page.click('#message-close');
+    assert.deepEqual(await readDisplay(page), before);
+  }));
+
+const triangle = {
+  asset: { version: '2.0' },
+  scenes: [{ nodes: [0] }],
+  nodes: [{ mesh: 0 }],
+  meshes: [{ primitives: [{ attributes: { POSITION: 0 } }] }],
+  buffers: [{ byteLength: 36, uri: `data:application/octet-stream;base64,${Buffer.from(new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0]).buffer).toString('base64')}` }],
+  bufferViews: [{ buffer: 0, byteLength: 36 }],
+  accessors: [{ bufferView: 0, componentType: 5126, count: 3, type: 'VEC3', min: [0, 0, 0], max: [1, 1, 0] }],
+};
+
+test('a dropped .gltf is shown', () =>
+  withPage('?scene=cornell&technique=normals&size=16x16&frames=1', async (page) => {
+    await waitForFrames(page, 1);
+    const before = await readDisplay(page);
+    await drop(page, 'triangle.gltf', JSON.stringify(triangle));
+    await page.waitForFunction(() => document.getElementById('scene').value === 'triangle.gltf', { polling: 50 });
+    await waitForFrames(page, 1);
+    assert.notDeepEqual(await readDisplay(page), before);
+  }));
+
+test('something that is no scene is refused in words', () =>
+  withPage('?scene=cornell&technique=normals&size=16x16&frames=1', async (page) => {
+    await waitForFrames(page, 1);
+    await drop(page, 'notes.txt', 'hello');
+    assert.match(await waitForMessage(page), /notes\.txt is neither/);
+  }));
+
+test('a browser without WebGPU is told so', () =>
+  withPage(
+    '',
+    async (page) => assert.match(await waitForMessage(page), /no WebGPU/),
+    () => Object.defineProperty(Navigator.prototype, 'gpu', { value: undefined }),
+  ));
+
+test('a machine without an adapter is told so', () =>
+  withPage(
+    '',
+    async (page) => assert.match(await waitForMessage(page), /No graphics adapter/),
+    () => (GPU.prototype.requestAdapter = async () => null),
+  ));

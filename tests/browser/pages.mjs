@@ -1,0 +1,80 @@
+// Opens the built page in the browser under test and looks at what it shows.
+import { strict as assert } from 'node:assert';
+import { serve } from '../../scripts/serve.mjs';
+import { dist } from '../../scripts/build.mjs';
+import { launch } from './browsers.mjs';
+
+/** A software adapter on two busy cores may take this long for anything. */
+const patience = 60_000;
+
+/** The browser and the page's server, from a sub-path as a file host would have it. */
+export async function openSite() {
+  const [{ browser, close: closeBrowser }, server] = await Promise.all([launch(), serve(dist, 0, '/some/where/')]);
+  return { browser, url: server.url, close: () => Promise.all([closeBrowser(), server.close()]) };
+}
+
+/** Opens the page with `query`. `problems` collects console errors, exceptions and failed requests. `before` runs ahead of its scripts. */
+export async function openPage({ browser, url }, query, before) {
+  const page = await browser.newPage();
+  page.setDefaultTimeout(patience);
+  await page.setViewport({ width: 640, height: 400 });
+  const problems = [];
+  page.on('console', (message) => message.type() === 'error' && problems.push(message.text()));
+  page.on('pageerror', (error) => problems.push(String(error)));
+  page.on('requestfailed', (request) => problems.push(`${request.url()}: ${request.failure()?.errorText}`));
+  if (before) await page.evaluateOnNewDocument(before);
+  await page.goto(url + query, { waitUntil: 'domcontentloaded' });
+  return { page, problems };
+}
+
+/** Waits until the viewer has `frames` frames in its picture (at most, and never more than, what `frames=` in the query says). */
+export async function waitForFrames(page, frames) {
+  await page.waitForFunction(
+    async (wanted) => {
+      if (!document.getElementById('message').hidden) throw new Error(document.getElementById('message').textContent);
+      return (await window.restir.call((viewer) => viewer.frames())) >= wanted;
+    },
+    { polling: 50 },
+    frames,
+  );
+}
+
+/** The displayed pixels: three bytes each, row-major from the top. */
+export async function readDisplay(page) {
+  // Base64, for an array of numbers takes seconds through the browser protocols.
+  const text = await page.evaluate(async () => {
+    const bytes = await window.restir.call((viewer) => viewer.read_display());
+    let binary = '';
+    for (const byte of bytes) binary += String.fromCharCode(byte);
+    return btoa(binary);
+  });
+  const rgba = Buffer.from(text, 'base64');
+  return Uint8Array.from({ length: (rgba.length / 4) * 3 }, (_, at) => rgba[Math.floor(at / 3) * 4 + (at % 3)]);
+}
+
+/** The text of the message the page shows, once it shows one. */
+export async function waitForMessage(page) {
+  await page.waitForFunction(() => !document.getElementById('message').hidden, { polling: 50 });
+  return page.evaluate(() => document.getElementById('message').innerText);
+}
+
+/** Mean over all bytes. */
+export const mean = (bytes) => bytes.reduce((sum, byte) => sum + byte, 0) / bytes.length;
+
+/** The largest mean brightness of an 8 by 8 grid of tiles, minus the smallest: 0 for a flat picture. */
+export function contrast(rgb, width, height) {
+  const tiles = Array.from({ length: 64 }, () => ({ sum: 0, count: 0 }));
+  for (let at = 0; at < rgb.length; at++) {
+    const pixel = Math.floor(at / 3);
+    const tile = tiles[Math.floor((Math.floor(pixel / width) * 8) / height) * 8 + Math.floor(((pixel % width) * 8) / width)];
+    tile.sum += rgb[at];
+    tile.count += 1;
+  }
+  const means = tiles.filter(({ count }) => count > 0).map(({ sum, count }) => sum / count);
+  return Math.max(...means) - Math.min(...means);
+}
+
+/** Fails with all of them if the page had problems. */
+export function assertNoProblems(problems) {
+  assert.deepEqual(problems, [], 'console errors, exceptions or failed requests');
+}

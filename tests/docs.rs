@@ -1,0 +1,220 @@
+//! The written pages agree with the program: parameter tables, technique pages, links and command lines.
+//! `UPDATE_DOCS=1 cargo test --test docs` rewrites the parameter tables.
+
+use restir::params::{FilmParams, ParamKind, ParamSpec, Params, RenderParams};
+use restir::techniques::{self, TechniqueInfo};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// What every technique page has, in this order.
+const SECTIONS: [&str; 6] = ["What it computes", "Passes", "Parameters", "Bias", "Limits", "Figures"];
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn read(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+fn technique_page(info: &TechniqueInfo) -> PathBuf {
+    root().join(format!("docs/techniques/{}.md", info.id))
+}
+
+/// Every page: those in the root and those below `docs/`.
+fn pages() -> Vec<PathBuf> {
+    fn collect(folder: &Path, deep: bool, out: &mut Vec<PathBuf>) {
+        for entry in std::fs::read_dir(folder).expect("a readable folder") {
+            let path = entry.expect("a readable folder").path();
+            if path.is_dir() && deep {
+                collect(&path, deep, out);
+            } else if path.extension().is_some_and(|e| e == "md") {
+                out.push(path);
+            }
+        }
+    }
+    let mut out = Vec::new();
+    collect(&root(), false, &mut out);
+    collect(&root().join("docs"), true, &mut out);
+    out
+}
+
+/// A value's bits as a person types it.
+fn value(kind: ParamKind, bits: u32) -> String {
+    match kind {
+        ParamKind::Uint { .. } => bits.to_string(),
+        ParamKind::Float { .. } => f32::from_bits(bits).to_string(),
+        ParamKind::Flag => (bits != 0).to_string(),
+        ParamKind::Choice(names) => names[bits as usize].to_owned(),
+    }
+}
+
+/// A Markdown table of parameters, each key as `--set`, the URL and the panel take it.
+fn parameter_table(prefix: &str, specs: &[ParamSpec]) -> String {
+    if specs.is_empty() {
+        return "No parameters of its own.\n".to_owned();
+    }
+    let mut table = String::from("| parameter | default | values | unit | meaning |\n|---|---|---|---|---|\n");
+    for spec in specs {
+        let values = match spec.kind {
+            ParamKind::Uint { min, max } => format!("{min} to {max}, whole"),
+            ParamKind::Float { min, max } => format!("{min} to {max}"),
+            ParamKind::Flag => "`true`, `false`".to_owned(),
+            ParamKind::Choice(names) => names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", "),
+        };
+        let (default, doc) = (value(spec.kind, spec.default), spec.doc.replace('|', "\\|"));
+        table += &format!("| `{prefix}{}` | `{default}` | {values} | {} | {doc} |\n", spec.name, spec.unit);
+    }
+    table
+}
+
+/// Every generated table with the page it belongs to and its name there.
+fn tables() -> Vec<(PathBuf, &'static str, String)> {
+    let global = root().join("docs/parameters.md");
+    let mut tables = vec![
+        (global.clone(), "render", parameter_table("render.", RenderParams::SPECS)),
+        (global, "film", parameter_table("film.", FilmParams::SPECS)),
+    ];
+    tables.extend(techniques::ALL.iter().map(|info| {
+        let views = info.views.iter().map(|v| format!("`{v}`")).collect::<Vec<_>>().join(", ");
+        let mut table = parameter_table("", info.params);
+        if !views.is_empty() {
+            table += &format!("\nDebug views of its own: {views}.\n");
+        }
+        (technique_page(info), info.id, table)
+    }));
+    tables
+}
+
+/// `page` with what stands between the markers of `name` replaced by `table`.
+fn with_table(page: &str, name: &str, table: &str) -> Option<String> {
+    let opening = format!("<!-- parameters:{name} -->\n");
+    let (before, rest) = page.split_once(&opening)?;
+    let (_, after) = rest.split_once("<!-- /parameters -->")?;
+    Some(format!("{before}{opening}{table}<!-- /parameters -->{after}"))
+}
+
+#[test]
+fn parameter_tables_are_those_of_the_declarations() {
+    let update = std::env::var_os("UPDATE_DOCS").is_some();
+    for (path, name, table) in tables() {
+        let page = read(&path);
+        let fresh = with_table(&page, name, &table)
+            .unwrap_or_else(|| panic!("{}: no <!-- parameters:{name} --> ... <!-- /parameters -->", path.display()));
+        if update {
+            std::fs::write(&path, fresh).expect("a writable page");
+        } else {
+            assert!(page == fresh, "{}: run UPDATE_DOCS=1 cargo test --test docs", path.display());
+        }
+    }
+}
+
+#[test]
+fn a_stale_table_is_seen() {
+    let page = "a\n<!-- parameters:x -->\nold\n<!-- /parameters -->\nz\n";
+    let fresh = with_table(page, "x", "new\n").expect("markers");
+    assert_eq!(fresh, "a\n<!-- parameters:x -->\nnew\n<!-- /parameters -->\nz\n");
+    assert_eq!(with_table(page, "y", ""), None);
+}
+
+#[test]
+fn every_technique_has_a_page_and_every_page_a_technique() {
+    for info in techniques::ALL {
+        let page = read(&technique_page(info));
+        let sections: Vec<&str> = page.lines().filter_map(|line| line.strip_prefix("## ")).collect();
+        assert_eq!(sections, SECTIONS, "docs/techniques/{}.md", info.id);
+    }
+    let ids: BTreeSet<String> = techniques::ALL.iter().map(|info| info.id.to_owned()).collect();
+    let files = std::fs::read_dir(root().join("docs/techniques")).expect("docs/techniques");
+    let named: BTreeSet<String> = files
+        .map(|file| file.expect("docs/techniques").path())
+        .filter_map(|path| Some(path.file_stem()?.to_str()?.to_owned()))
+        .collect();
+    assert_eq!(named, ids);
+}
+
+/// The lines of a page outside its code blocks.
+fn prose(page: &str) -> Vec<&str> {
+    let mut code = false;
+    page.lines()
+        .filter(|line| {
+            let fence = line.trim_start().starts_with("```");
+            code ^= fence;
+            !code && !fence
+        })
+        .collect()
+}
+
+/// The targets of all links and pictures.
+fn links(page: &str) -> Vec<String> {
+    let parts = prose(page).into_iter().flat_map(|line| line.split("](").skip(1));
+    parts.filter_map(|rest| rest.split_once(')').map(|(target, _)| target.to_owned())).collect()
+}
+
+/// The anchors that a page's headings make, as GitHub spells them.
+fn anchors(page: &str) -> BTreeSet<String> {
+    let headings = prose(page).into_iter().filter(|line| line.starts_with('#'));
+    headings
+        .map(|line| {
+            let title = line.trim_start_matches('#').trim().to_lowercase();
+            let kept = title.chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
+            kept.map(|c| if c == ' ' { '-' } else { c }).collect()
+        })
+        .collect()
+}
+
+#[test]
+fn every_relative_link_resolves() {
+    let mut broken = Vec::new();
+    let mut seen = 0;
+    for path in pages() {
+        for link in links(&read(&path)).into_iter().filter(|link| !link.contains("://")) {
+            seen += 1;
+            let (file, anchor) = link.split_once('#').unwrap_or((&link, ""));
+            let folder = path.parent().expect("a page lies in a folder");
+            let target = if file.is_empty() { path.clone() } else { folder.join(file) };
+            if !target.exists() || (!anchor.is_empty() && !anchors(&read(&target)).contains(anchor)) {
+                broken.push(format!("{}: {link}", path.display()));
+            }
+        }
+    }
+    assert!(seen > 0, "no links were found");
+    assert!(broken.is_empty(), "{}", broken.join("\n"));
+}
+
+/// Every `restir ...` line in the code blocks of a page, continued lines joined.
+fn command_lines(page: &str) -> Vec<String> {
+    let outside: BTreeSet<*const u8> = prose(page).into_iter().map(str::as_ptr).collect();
+    let code: Vec<&str> = page.lines().filter(|line| !outside.contains(&line.as_ptr())).collect();
+    let joined = code.join("\n").replace("\\\n", " ");
+    joined.lines().map(str::trim).filter(|line| line.starts_with("restir ")).map(str::to_owned).collect()
+}
+
+#[test]
+fn command_lines_name_real_subcommands_and_options() {
+    let mut help = BTreeMap::new();
+    let mut seen = 0;
+    for path in pages() {
+        for line in command_lines(&read(&path)) {
+            seen += 1;
+            let place = format!("{}: {line}", path.display());
+            // What follows # is a remark, what follows | another program.
+            let command = line.split(['#', '|']).next().unwrap_or_default();
+            let mut words = command.split_whitespace().skip(1);
+            let subcommand = words.next().unwrap_or_else(|| panic!("{place}: no subcommand")).to_owned();
+            let help = help.entry(subcommand.clone()).or_insert_with(|| {
+                let output = Command::new(env!("CARGO_BIN_EXE_restir")).args([&subcommand, "--help"]).output();
+                let output = output.expect("the restir binary runs");
+                assert!(output.status.success(), "{place}: there is no subcommand '{subcommand}'");
+                String::from_utf8_lossy(&output.stdout).into_owned()
+            });
+            for option in words.map(|w| w.trim_matches(['[', ']', '.'])).filter(|w| w.starts_with("--")) {
+                let name = option.split('=').next().unwrap_or_default();
+                let known = help.split([' ', ',', '\n', '=']).any(|word| word == name);
+                assert!(known, "{place}: '{subcommand}' has no {name}");
+            }
+        }
+    }
+    assert!(seen > 0, "no command lines were found");
+}

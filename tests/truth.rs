@@ -1,0 +1,215 @@
+//! Equivalence: `restir-di` with the unbiased setting has the same expectation as the path tracer's direct light, by two
+//! one-sided tests (TOST) on means over independent runs; and the same test catches planted biases.
+//!
+//! Margins (docs/testing.md): 0.2 % of the mean over the picture, 1 % over each 32x32 tile, at 95 % confidence. A plant
+//! counts as caught only if its measured bias lies so far outside a margin that a repetition of the test would fail with
+//! probability 0.9 or more.
+
+mod support;
+
+use restir::scene::Camera;
+use restir::{FlatScene, Gpu, Image, Renderer};
+use std::path::{Path, PathBuf};
+use support::*;
+
+const SIZE: u32 = 64;
+const TILE: u32 = 32;
+const GLOBAL_MARGIN: f64 = 0.002;
+const TILE_MARGIN: f64 = 0.01;
+/// One-sided 95 % and 90 % quantiles of the normal distribution; runs are many enough.
+const Z_95: f64 = 1.645;
+const Z_90: f64 = 1.282;
+
+/// The Cornell box from inside: blocks, shadows and no light source in view, so that the mean is all scattered light.
+fn scene() -> FlatScene {
+    let mut scene = builtin("cornell");
+    scene.cameras =
+        vec![Camera::look_at("test", [-0.35, 0.85, 0.45].into(), [0.12, 0.05, -0.1].into(), 60f32.to_radians())];
+    scene
+}
+
+/// Mean radiance of the picture, then of each tile.
+fn means(image: &Image) -> Vec<f64> {
+    let tiles = SIZE / TILE;
+    let mut sums = vec![0.0; 1 + (tiles * tiles) as usize];
+    for (i, pixel) in image.pixels.iter().enumerate() {
+        let value: f64 = pixel.iter().map(|c| f64::from(*c)).sum::<f64>() / 3.0;
+        let (x, y) = (i as u32 % SIZE / TILE, i as u32 / SIZE / TILE);
+        sums[0] += value / f64::from(SIZE * SIZE);
+        sums[1 + (y * tiles + x) as usize] += value / f64::from(TILE * TILE);
+    }
+    sums
+}
+
+/// Mean and standard error of each region over independent runs.
+struct Estimate {
+    mean: Vec<f64>,
+    error: Vec<f64>,
+}
+
+fn estimate(renderer: &mut Renderer, runs: u32, frames: u32) -> Estimate {
+    let samples: Vec<Vec<f64>> = (0..runs)
+        .map(|run| {
+            renderer.set_seed(1000 + run);
+            means(&render(renderer, frames))
+        })
+        .collect();
+    let n = f64::from(runs);
+    let mean: Vec<f64> = (0..samples[0].len()).map(|i| samples.iter().map(|s| s[i]).sum::<f64>() / n).collect();
+    let error = (0..mean.len())
+        .map(|i| (samples.iter().map(|s| (s[i] - mean[i]).powi(2)).sum::<f64>() / (n * (n - 1.0))).sqrt())
+        .collect();
+    Estimate { mean, error }
+}
+
+/// Relative difference and its standard error, region by region, with the region's margin.
+fn differences(estimate: &Estimate, reference: &Estimate) -> Vec<(f64, f64, f64)> {
+    (0..reference.mean.len())
+        .map(|i| {
+            let difference = estimate.mean[i] / reference.mean[i] - 1.0;
+            let error = estimate.error[i].hypot(reference.error[i]) / reference.mean[i];
+            (difference, error, if i == 0 { GLOBAL_MARGIN } else { TILE_MARGIN })
+        })
+        .collect()
+}
+
+fn is_equivalent(differences: &[(f64, f64, f64)]) -> bool {
+    differences.iter().all(|(d, e, margin)| d.abs() + Z_95 * e < *margin)
+}
+
+/// Whether a repetition of the test would fail with probability 0.9 or more in some region.
+fn is_caught(differences: &[(f64, f64, f64)]) -> bool {
+    differences.iter().any(|(d, e, margin)| d.abs() + Z_95 * e - Z_90 * e > *margin && d.abs() > *margin)
+}
+
+fn show(name: &str, differences: &[(f64, f64, f64)]) {
+    let parts: Vec<_> = differences.iter().map(|(d, e, _)| format!("{:+.3}±{:.3} %", 100.0 * d, 100.0 * e)).collect();
+    println!("{name}: {}", parts.join(", "));
+}
+
+const DIRECT: &[(&str, &str)] = &[("render.max_depth", "1")];
+
+fn reference(gpu: &Gpu) -> Estimate {
+    let mut reference = renderer(gpu, scene(), [SIZE; 2], "path-tracer", DIRECT);
+    estimate(&mut reference, 16, 256)
+}
+
+/// Eight frames of history in each run, all reuse on.
+fn restir(gpu: &Gpu, settings: &[(&str, &str)]) -> Renderer {
+    let base = [("indirect", "no"), ("light_samples", "4"), ("history_cap", "4"), ("spatial_radius", "10")];
+    renderer(gpu, scene(), [SIZE; 2], "restir-di", &[&base[..], DIRECT, settings].concat())
+}
+
+const RUNS: u32 = 48;
+const FRAMES: u32 = 16;
+
+#[test]
+fn restir_di_equals_the_path_tracer() {
+    let gpu = gpu();
+    let reference = reference(&gpu);
+    println!("reference: mean {:.5} ± {:.3} %", reference.mean[0], 100.0 * reference.error[0] / reference.mean[0]);
+    for settings in [&[][..], &[("reservoir_size", "4"), ("spatial_iterations", "2"), ("visibility_reuse", "no")]] {
+        let differences = differences(&estimate(&mut restir(&gpu, settings), RUNS, FRAMES), &reference);
+        show(&format!("unbiased {settings:?}"), &differences);
+        assert!(is_equivalent(&differences), "{settings:?} is not equivalent");
+    }
+}
+
+#[test]
+fn planted_biases_are_caught() {
+    let gpu = gpu();
+    let reference = reference(&gpu);
+    // Biased settings are plants that need no edit.
+    for bias_correction in ["none", "1/z", "mis"] {
+        let mut renderer = restir(&gpu, &[("bias_correction", bias_correction)]);
+        let differences = differences(&estimate(&mut renderer, RUNS / 4, FRAMES), &reference);
+        show(bias_correction, &differences);
+        assert!(is_caught(&differences), "bias_correction = {bias_correction} went unnoticed");
+    }
+    // Each: what, the file, what stands there, what is put in its place.
+    let plants = [
+        (
+            "no shadow ray when shading",
+            "techniques/common/resampling.wgsl",
+            "if luminance(unshadowed) <= 0.0 || !is_visible(surface, light.direction, light.distance) {",
+            "if luminance(unshadowed) <= 0.0 {",
+        ),
+        (
+            "history counted in full, offered at its cap",
+            "techniques/restir-di/temporal.wgsl",
+            "combination_correct(&combination, previous, 1u, history_confidence, true);",
+            "combination_correct(&combination, previous, 1u, 2.0 * history_confidence + 1.0, true);",
+        ),
+        (
+            "the neighbour's target function in place of the canonical one",
+            "techniques/restir-di/combine.wgsl",
+            "let weight = confidence_weight * target_function(canonical, sample, false)",
+            "let weight = confidence_weight * target_function(canonical, sample, false) * (1.0 + f32(min(domain, 1u)))",
+        ),
+        (
+            "temporal reuse with the random numbers of the initial candidates",
+            "techniques/restir-di/temporal.wgsl",
+            "frame.seed, STREAM_TEMPORAL)",
+            "frame.seed, STREAM_INITIAL)",
+        ),
+        (
+            "the candidate count left out of the initial weights' mean",
+            "techniques/common/resampling.wgsl",
+            "(pdf * f32(candidate_count))",
+            "(pdf * f32(candidate_count - 1u))",
+        ),
+    ];
+    for (what, file, old, new) in plants {
+        let folder = ShaderCopy::new();
+        let gpu = support::gpu();
+        let mut renderer = restir(&gpu, &[]);
+        render(&mut renderer, 1);
+        gpu.watch_shaders(&folder.0);
+        folder.edit(file, old, new);
+        let differences = differences(&estimate(&mut renderer, RUNS / 4, FRAMES), &reference);
+        assert_eq!(renderer.shader_problems, Vec::<String>::new());
+        show(what, &differences);
+        assert!(is_caught(&differences), "'{what}' went unnoticed");
+    }
+}
+
+/// A copy of `shaders/` to plant faults in, removed when dropped.
+struct ShaderCopy(PathBuf);
+
+impl ShaderCopy {
+    fn new() -> Self {
+        use std::sync::atomic::{AtomicU32, Ordering};
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let name = format!("restir-shaders-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+        let copy = std::env::temp_dir().join(name);
+        copy_folder(&Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"), &copy);
+        // File times are coarse on some systems; an edit must be newer than the copy.
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        ShaderCopy(copy)
+    }
+
+    fn edit(&self, file: &str, old: &str, new: &str) {
+        let path = self.0.join(file);
+        let text = std::fs::read_to_string(&path).expect("the shader is there");
+        assert_eq!(text.matches(old).count(), 1, "{file}: '{old}' must stand there once");
+        std::fs::write(path, text.replace(old, new)).expect("the copy is writable");
+    }
+}
+
+impl Drop for ShaderCopy {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn copy_folder(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).expect("the temporary folder is writable");
+    for entry in std::fs::read_dir(from).expect("shaders/ is readable").flatten() {
+        let target = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy_folder(&entry.path(), &target);
+        } else {
+            std::fs::copy(entry.path(), target).expect("the temporary folder is writable");
+        }
+    }
+}

@@ -1,0 +1,78 @@
+// The shape of the JSON that the wasm module hands over. Its source is the parameter declarations in Rust.
+
+/** One declared parameter of a technique, the film or the renderer. */
+export interface Parameter {
+  name: string;
+  /** What it is, and what a higher and a lower value do. */
+  doc: string;
+  kind: 'u32' | 'f32' | 'bool' | 'choice';
+  default: number | boolean | string;
+  min?: number;
+  max?: number;
+  unit?: string;
+  choices?: string[];
+}
+
+export interface TechniqueInfo {
+  id: string;
+  title: string;
+  summary: string;
+  papers: string[];
+  /** False where its expected picture differs from the reference; `bias` says how. */
+  unbiased: boolean;
+  bias: string;
+  /** Names of what can be shown; the first is the picture itself. */
+  views: string[];
+  params: Parameter[];
+}
+
+export interface SceneInfo {
+  name: string;
+  title: string;
+  doc: string;
+  /** A name that can be loaded: `name` with its number filled in, where it takes one. */
+  example: string;
+}
+
+/** What `describe()` returns. */
+export interface Description {
+  version: string;
+  techniques: TechniqueInfo[];
+  film: { params: Parameter[] };
+  render: { params: Parameter[] };
+  scenes: SceneInfo[];
+}
+
+export type Vector = [number, number, number];
+
+/** A camera as the module gives and takes it. Perspective has `vertical_fov` (radians), orthographic `half_height`. */
+export interface Camera {
+  name?: string;
+  position: Vector;
+  forward: Vector;
+  up: Vector;
+  vertical_fov?: number;
+  half_height?: number;
+}
+
+/** What `Viewer.stats()` resolves to: rays and passes of the last frame, `nan` and `inf` since the picture began. */
+export interface Stats {
+  rays: number;
+  nan: number;
+  inf: number;
+  passes: { name: string; ms: number }[];
+}
+
+/** What `Viewer.info()` returns: what the renderer has, and what was left out or repaired while the scene was read. */
+export interface SceneReport {
+  warnings: string[];
+  /** Whether something moves; then frames are not averaged unless asked for. */
+  animated: boolean;
+  adapter: string;
+}
+
+/** What the wasm module throws; `code` is that of `Error::code` in Rust. */
+export interface Failure {
+  code: string;
+  message: string;
+}

@@ -1,0 +1,95 @@
+// One frame in flight, and nobody else on the viewer while it is: every other call waits in a queue between frames.
+import type { Viewer } from './pkg/restir.js';
+
+type Work = (viewer: Viewer) => Promise<void>;
+
+const nextAnimationFrame = () => new Promise<number>((resolve) => requestAnimationFrame(resolve));
+
+export interface LoopEvents {
+  /** Before each frame, with the seconds since the last call. Returns whether the picture must change. */
+  beforeFrame(viewer: Viewer, seconds: number): boolean;
+  /** After each frame, with the milliseconds from its first command to an idle device. */
+  afterFrame(viewer: Viewer, milliseconds: number): Promise<void>;
+  /** A frame failed. The loop has let go of the viewer. */
+  failed(error: unknown): void;
+}
+
+export class RenderLoop {
+  paused = false;
+  /** Stops after so many accumulated frames, until something changes. */
+  frameLimit = Infinity;
+  private viewer: Viewer | undefined;
+  private readonly queue: Work[] = [];
+  private changed = false;
+  /** Frames since the last change: where frames are not averaged, the viewer's own count stays at 1. */
+  private frames = 0;
+
+  constructor(private readonly events: LoopEvents) {
+    void this.run();
+  }
+
+  /** Renders with `viewer` from now on. */
+  attach(viewer: Viewer): void {
+    this.viewer = viewer;
+    this.changed = true;
+  }
+
+  /** Renders one frame even while paused. */
+  step(): void {
+    this.changed = true;
+  }
+
+  /** Runs `work` between two frames. Resolves or rejects as `work` does. */
+  call<T>(work: (viewer: Viewer) => T | Promise<T>): Promise<T> {
+    return new Promise((resolve, reject) => {
+      this.queue.push(async (viewer) => {
+        try {
+          resolve(await work(viewer));
+        } catch (error) {
+          reject(error);
+        }
+      });
+    });
+  }
+
+  /** As `call`, for what makes the picture start again: renders a frame even while paused. */
+  change<T>(work: (viewer: Viewer) => T | Promise<T>): Promise<T> {
+    return this.call((viewer) => {
+      this.changed = true;
+      return work(viewer);
+    });
+  }
+
+  /** Whether the picture has as many frames as it shall have. */
+  isComplete(viewer: Viewer): boolean {
+    return Math.max(viewer.frames(), this.frames) >= this.frameLimit;
+  }
+
+  private async run(): Promise<never> {
+    let last = performance.now();
+    for (;;) {
+      const now = await nextAnimationFrame();
+      const seconds = Math.min(Math.max(now - last, 0) / 1000, 0.1);
+      last = now;
+      if (this.viewer) await this.turn(this.viewer, seconds);
+    }
+  }
+
+  private async turn(viewer: Viewer, seconds: number): Promise<void> {
+    try {
+      for (let work = this.queue.shift(); work; work = this.queue.shift()) await work(viewer);
+      const changed = this.events.beforeFrame(viewer, seconds) || this.changed;
+      if (changed) this.frames = 0;
+      else if (this.paused || this.isComplete(viewer)) return;
+      this.changed = false;
+      this.frames += 1;
+      const start = performance.now();
+      viewer.render();
+      await viewer.idle();
+      await this.events.afterFrame(viewer, performance.now() - start);
+    } catch (error) {
+      this.viewer = undefined;
+      this.events.failed(error);
+    }
+  }
+}

@@ -1,0 +1,128 @@
+// The page's state in the URL's query, so that a link is a picture. Keys of parameters are those of the CLI's --set.
+import type { Camera, Vector } from './api.js';
+
+export interface PageState {
+  /** A built-in scene's name; undefined for a file of the user's. */
+  scene: string | undefined;
+  technique: string;
+  view: string;
+  seed: number;
+  /** Whether frames are averaged; undefined leaves it to the scene (an animated one is not). */
+  accumulate: boolean | undefined;
+  /** Point lights to scatter in a scene that has none. */
+  lights: number;
+  /** Index or name among the scene's cameras. */
+  camera: string;
+  /** Where the user has moved to, if they have. */
+  pose: Pick<Camera, 'position' | 'forward' | 'up'> | undefined;
+  /** Render size in pixels; undefined follows the window. */
+  size: [number, number] | undefined;
+  /** Rendered pixels per device pixel, along one side; undefined adapts. */
+  scale: number | undefined;
+  /** Accumulated frames after which to stop. */
+  frames: number | undefined;
+  /** Parameters that differ from their defaults. */
+  values: Map<string, string>;
+}
+
+export const defaultState = (technique: string): PageState => ({
+  scene: 'cornell',
+  technique,
+  view: 'radiance',
+  seed: 0,
+  accumulate: undefined,
+  lights: 0,
+  camera: '0',
+  pose: undefined,
+  size: undefined,
+  scale: undefined,
+  frames: undefined,
+  values: new Map(),
+});
+
+function integer(text: string, low: number, high: number): number {
+  const value = Number(text);
+  if (!/^\d+$/.test(text) || value < low || value > high) throw new Error(`must be a whole number from ${low} to ${high}`);
+  return value;
+}
+
+function size(text: string): [number, number] {
+  const found = /^(\d+)x(\d+)$/.exec(text);
+  if (!found) throw new Error('must be WIDTHxHEIGHT in pixels');
+  return [integer(found[1] ?? '', 1, 16384), integer(found[2] ?? '', 1, 16384)];
+}
+
+function scale(text: string): number {
+  const value = Number(text);
+  if (!(value >= 0.1 && value <= 2)) throw new Error('must be from 0.1 to 2');
+  return value;
+}
+
+function accumulate(text: string): boolean {
+  if (text !== 'yes' && text !== 'no') throw new Error('must be yes or no');
+  return text === 'yes';
+}
+
+function pose(text: string): PageState['pose'] {
+  const numbers = text.split(',').map(Number);
+  if (numbers.length !== 9 || !numbers.every(Number.isFinite)) throw new Error('must be nine numbers: position, forward, up');
+  const vector = (at: number) => numbers.slice(at, at + 3) as Vector;
+  return { position: vector(0), forward: vector(3), up: vector(6) };
+}
+
+const poseText = ({ position, forward, up }: NonNullable<PageState['pose']>) =>
+  [...position, ...forward, ...up].map((value) => String(Number(value.toPrecision(5)))).join(',');
+
+const readers: Record<string, (state: PageState, text: string) => void> = {
+  scene: (state, text) => (state.scene = text),
+  technique: (state, text) => (state.technique = text),
+  view: (state, text) => (state.view = text),
+  seed: (state, text) => (state.seed = integer(text, 0, 0xffffffff)),
+  accumulate: (state, text) => (state.accumulate = accumulate(text)),
+  lights: (state, text) => (state.lights = integer(text, 0, 1_000_000)),
+  camera: (state, text) => (state.camera = text),
+  pose: (state, text) => (state.pose = pose(text)),
+  size: (state, text) => (state.size = size(text)),
+  scale: (state, text) => (state.scale = scale(text)),
+  frames: (state, text) => (state.frames = integer(text, 1, 0xffffffff)),
+};
+
+/** Reads a query. Keys that are none of the page's are taken for parameters; what cannot be read becomes a warning. */
+export function readQuery(query: string, technique: string): { state: PageState; warnings: string[] } {
+  const state = defaultState(technique);
+  const warnings: string[] = [];
+  for (const [key, text] of new URLSearchParams(query)) {
+    const read = Object.hasOwn(readers, key) ? readers[key] : undefined;
+    try {
+      if (read) read(state, text);
+      else state.values.set(key, text);
+    } catch (error) {
+      warnings.push(`${key}=${text} in the address: ${(error as Error).message}`);
+    }
+  }
+  return { state, warnings };
+}
+
+/** The query for `state`, with only what differs from the defaults; empty where nothing does. */
+export function writeQuery(state: PageState, technique: string): string {
+  const defaults = defaultState(technique);
+  const query = new URLSearchParams();
+  const put = (key: string, value: string | number | undefined, standard: string | number | undefined) => {
+    if (value !== undefined && value !== standard) query.set(key, String(value));
+  };
+  put('scene', state.scene, defaults.scene);
+  put('technique', state.technique, defaults.technique);
+  put('view', state.view, defaults.view);
+  put('seed', state.seed, defaults.seed);
+  put('accumulate', state.accumulate === undefined ? undefined : state.accumulate ? 'yes' : 'no', undefined);
+  put('lights', state.lights, defaults.lights);
+  put('camera', state.camera, defaults.camera);
+  put('pose', state.pose && poseText(state.pose), undefined);
+  put('size', state.size?.join('x'), undefined);
+  put('scale', state.scale, undefined);
+  put('frames', state.frames, undefined);
+  for (const [key, value] of state.values) query.set(key, value);
+  // Commas and colons need no escape in a query, and links are read by people.
+  const text = query.toString().replaceAll('%2C', ',').replaceAll('%3A', ':');
+  return text && `?${text}`;
+}
