@@ -2,11 +2,21 @@
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
 pub mod gltf_writer;
+pub mod harness;
+pub mod statistics;
+pub mod twins;
 
 use restir::{FlatScene, Gpu, GpuOptions, Image, Renderer, Scene};
+use std::sync::OnceLock;
 
-/// A device within WebGPU's default limits: what passes here runs everywhere.
+/// The test binary's device, within WebGPU's default limits: what passes here runs everywhere.
 pub fn gpu() -> Gpu {
+    static SHARED: OnceLock<Gpu> = OnceLock::new();
+    SHARED.get_or_init(fresh_gpu).clone()
+}
+
+/// A device of a test's own, for tests that change what it compiles or keeps.
+pub fn fresh_gpu() -> Gpu {
     pollster::block_on(Gpu::headless(&GpuOptions { default_limits: true }))
         .expect("a Vulkan driver (Debian: mesa-vulkan-drivers)")
 }

@@ -1,0 +1,64 @@
+// Functions that read the scene: textures, lights, the environment and the camera, for tests against Rust twins.
+// One invocation: one evaluation of the operation asked for. Reads one input and the scene. Writes one output.
+#include "tests/harness.wgsl"
+#include "scene/lights.wgsl"
+#include "scene/camera.wgsl"
+
+// As numbered in tests/support/mod.rs.
+const TEXTURE_READ = 0u;
+const LIGHT_SAMPLE = 1u;
+const LIGHT_CONTRIBUTION = 2u;
+const LIGHT_PDFS = 3u;
+const ENVIRONMENT = 4u;
+const ENVIRONMENT_SAMPLE = 5u;
+const CAMERA = 6u;
+const OFFSET_ORIGIN = 7u;
+
+fn evaluate(operation: u32, input: TestInput) -> TestOutput {
+    let a = float(input.a);
+    let b = float(input.b);
+    switch operation {
+        case TEXTURE_READ: {
+            return TestOutput(bits(texture_read(materials[input.b.x].base_color_texture, a)), vec4u(0u));
+        }
+        case LIGHT_SAMPLE: {
+            var rng = rng_new(input.a.xy, 0u, input.a.z, 0u);
+            let sample = light_sample(&rng);
+            return TestOutput(vec4u(sample.light, sample.point, bitcast<u32>(light_sample_pdf(sample)),
+                bitcast<u32>(lights[sample.light].pmf)), vec4u(0u));
+        }
+        case LIGHT_CONTRIBUTION: {
+            let light = light_contribution(LightSample(input.b.x, input.b.y), a.xyz, false);
+            return TestOutput(bits_3(light.value, light.distance), bits_3(light.direction, light.solid_angle_jacobian));
+        }
+        // The density of a sample on a triangle, converted to solid angle, beside the density of the ray that hits it.
+        case LIGHT_PDFS: {
+            let sample = LightSample(input.b.x, input.b.y);
+            let light = light_contribution(sample, a.xyz, false);
+            let triangle = lights[sample.light].triangle;
+            let distance = length(triangle_point(triangle, light_sample_barycentrics(sample)) - a.xyz);
+            return TestOutput(bits(vec4f(light_sample_pdf(sample) * light.solid_angle_jacobian,
+                light_hit_pdf(sample.light, triangle, light.direction, distance), 0.0, 0.0)), vec4u(0u));
+        }
+        case ENVIRONMENT: {
+            return TestOutput(bits_3(environment_evaluate(a.xyz), environment_pdf(a.xyz)),
+                bits(vec4f(environment_uv(a.xyz), 0.0, 0.0)));
+        }
+        case ENVIRONMENT_SAMPLE: { return TestOutput(bits_3(environment_sample(a), 0.0), vec4u(0u)); }
+        // Out along the ray of a film point, and back to the film.
+        case CAMERA: {
+            let ray = camera_ray(frame.camera, a.xy);
+            return TestOutput(bits(vec4f(project(frame.camera, ray.origin + a.z * ray.direction), 0.0, 0.0)),
+                bits_3(ray.direction, 0.0));
+        }
+        case OFFSET_ORIGIN: { return TestOutput(bits_3(offset_origin(a.xyz, b.xyz), 0.0), vec4u(0u)); }
+        default: { return TestOutput(vec4u(0u), vec4u(0u)); }
+    }
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x < test_run.count {
+        test_outputs[id.x] = evaluate(test_run.operation, test_inputs[id.x]);
+    }
+}
