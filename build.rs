@@ -37,7 +37,9 @@ fn main() {
             Ok((flattened, reflection)) => {
                 let id = file.trim_end_matches(".wgsl").trim_start_matches("techniques/").to_owned();
                 let flat_name = format!("{}.wgsl", id.replace('/', "."));
-                std::fs::write(out.join(&flat_name), &flattened.text).expect("OUT_DIR is writable");
+                // The page downloads no comments; lines keep their numbers, so errors still map to their source.
+                let text = if wasm { without_comments(&flattened.text) } else { flattened.text.clone() };
+                std::fs::write(out.join(&flat_name), text).expect("OUT_DIR is writable");
                 if let Some(copies) = &copies {
                     std::fs::write(copies.join(&flat_name), &flattened.text).expect("target folder is writable");
                 }
@@ -72,6 +74,11 @@ fn collect(root: &Path, folder: &Path, passes: &mut Vec<String>) {
             }
         }
     }
+}
+
+/// WGSL without its line comments (it has no strings that could hold a `//`).
+fn without_comments(text: &str) -> String {
+    text.lines().flat_map(|line| [line.split("//").next().unwrap_or_default().trim_end(), "\n"]).collect()
 }
 
 fn list<T>(items: &[T], show: impl Fn(&T) -> String) -> String {

@@ -40,7 +40,7 @@ function inputHash() {
 const isCurrent = (hash) => existsSync(dist) && existsSync(stamp) && readFileSync(stamp, 'utf8') === hash;
 
 async function buildWasm() {
-  const options = ['--release', '--target', 'web', '--mode', 'no-install', '--no-pack', '--out-name', 'restir', '--out-dir', wasmPackage];
+  const options = ['--profile', 'web', '--target', 'web', '--mode', 'no-install', '--no-pack', '--out-name', 'restir', '--out-dir', wasmPackage];
   await run(['wasm-pack', 'build', ...options]);
   const bytes = ['restir_bg.wasm', 'restir.js'].map((name) => brotliCompressSync(readFileSync(join(wasmPackage, name))).length);
   const [wasm, glue] = bytes.map((length) => length / 1000);

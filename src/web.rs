@@ -4,7 +4,7 @@
 use crate::film::blit::Blit;
 use crate::gpu::{Gpu, GpuOptions, instance};
 use crate::params::{FilmParams, ParamSpec, Params, RenderParams};
-use crate::scene::{Camera, Environment, Projection, builtin, environment, gltf};
+use crate::scene::{Camera, Projection, builtin, gltf};
 use crate::{Error, FlatScene, Renderer, Scene};
 use glam::{UVec2, Vec3};
 use wasm_bindgen::prelude::*;
@@ -72,8 +72,6 @@ pub fn flatten_file(
     name: &str,
     bytes: &[u8],
     resolve: &js_sys::Function,
-    environment_name: &str,
-    environment_bytes: &[u8],
     lights: u32,
     seed: u32,
     progress: &js_sys::Function,
@@ -88,12 +86,7 @@ pub fn flatten_file(
                 Error::bad_file(name, uri, "refers to a file that was not given; choose all its files at once")
             })
     };
-    let mut scene = gltf::load_bytes(name, bytes, &mut find).js()?;
-    if !environment_bytes.is_empty() {
-        let map: Environment = environment::decode(environment_name, environment_bytes).js()?;
-        scene.environment = Some(map);
-    }
-    flatten(scene, lights, seed, progress)
+    flatten(gltf::load_bytes(name, bytes, &mut find).js()?, lights, seed, progress)
 }
 
 /// A renderer that presents to a canvas.

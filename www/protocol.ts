@@ -1,8 +1,7 @@
 // The messages between the page and the worker that reads scenes.
 import type { Failure } from './api.js';
 
-/** Where a scene comes from: a built-in by name, or a glTF file with the files that lie beside it.
- * An .hdr or .exr among these becomes the environment. */
+/** Where a scene comes from: a built-in by name, or a glTF file with the files that lie beside it. */
 export type SceneSource =
   | { kind: 'builtin'; name: string }
   | { kind: 'file'; name: string; files: { name: string; bytes: Uint8Array }[] };

@@ -23,9 +23,7 @@ function flatten({ source, lights, seed }: LoadRequest): Uint8Array {
   const files = new Map(source.files.map(({ name, bytes }) => [baseName(name), bytes]));
   const resolve = (uri: string) => files.get(baseName(decoded(uri)));
   const main = files.get(baseName(source.name)) ?? new Uint8Array();
-  const environment = source.files.find(({ name }) => /\.(hdr|exr)$/i.test(name));
-  const environmentBytes = environment?.bytes ?? new Uint8Array();
-  return flatten_file(source.name, main, resolve, environment?.name ?? '', environmentBytes, lights, seed, progress);
+  return flatten_file(source.name, main, resolve, lights, seed, progress);
 }
 
 self.onmessage = async ({ data }: MessageEvent<LoadRequest>) => {
