@@ -107,7 +107,7 @@ fn check_light(scene: &FlatScene, index: usize, light: &Light) -> Result<(), &'s
     let scalars = [light.range, light.cos_inner, light.cos_outer, light.pmf, light.alias_threshold];
     let finite = vectors.iter().all(|v| v.is_finite()) && scalars.iter().all(|s| s.is_finite());
     must(finite, "numbers that are not finite")?;
-    must((light.alias as usize) < scene.lights.len(), "alias out of range")?;
+    must((light.alias_light as usize) < scene.lights.len(), "alias out of range")?;
     let is_last = index + 1 == scene.lights.len();
     match light.kind {
         LIGHT_TRIANGLE => {
