@@ -10,8 +10,9 @@ use restir::scene::{Camera, Environment, Instance, Material, Scene, builtin, sha
 use restir::{Error, FlatScene, Renderer, techniques};
 use support::*;
 
-/// Small, and no multiple of a workgroup.
-const SIZE: [u32; 2] = [32, 22];
+/// Small. Software drivers compile a kernel anew when the sides of its textures become or cease to be powers of two, so
+/// all tests but the one of sizes keep to one kind.
+const SIZE: [u32; 2] = [32, 16];
 
 /// Renders, and checks that nothing was left out of the film.
 #[track_caller]
@@ -188,7 +189,7 @@ fn extremes(spec: &ParamSpec) -> Vec<String> {
 fn every_parameter_renders_at_its_extremes() {
     for info in techniques::ALL {
         // Fewer pixels, for some extremes are a thousand samples a pixel.
-        let mut renderer = renderer(&gpu(), support::builtin("cornell-64"), [16, 11], info.id, &[]);
+        let mut renderer = renderer(&gpu(), support::builtin("cornell-64"), [16, 8], info.id, &[]);
         let own = info.params.iter().map(|spec| (spec.name.to_owned(), spec));
         let render = RenderParams::SPECS.iter().map(|spec| (format!("render.{}", spec.name), spec));
         let film = FilmParams::SPECS.iter().map(|spec| (format!("film.{}", spec.name), spec));
@@ -199,7 +200,7 @@ fn every_parameter_renders_at_its_extremes() {
                 render_clean(&mut renderer, 2, &format!("{} with {key}={value}", info.id));
                 if key.starts_with("film.") {
                     let display = pollster::block_on(renderer.read_display()).expect("a display");
-                    assert_eq!(display.len(), 16 * 11 * 4);
+                    assert_eq!(display.len(), 16 * 8 * 4);
                 }
             }
             renderer.set(&key, &default).unwrap_or_else(|e| panic!("{} {key}={default}: {e}", info.id));

@@ -208,7 +208,7 @@ fn edits_show_at_once_and_broken_edits_change_nothing() {
     }
     let gpu = fresh_gpu();
     gpu.watch_shaders(&folder.0);
-    let mut renderer = renderer(&gpu, builtin("cornell"), [16, 12], "normals", &[]);
+    let mut renderer = renderer(&gpu, builtin("cornell"), [16, 16], "normals", &[]);
     let before = render(&mut renderer, 1);
     assert!(renderer.shader_problems.is_empty(), "{:?}", renderer.shader_problems);
 
