@@ -102,8 +102,8 @@ fn write_entry(
         table,
         "/// `shaders/{file}`\npub static {name}: Shader = Shader {{\n    id: {id:?},\n    file: {file:?},\n    \
          source: include_str!(concat!(env!(\"OUT_DIR\"), \"/{flat_name}\")),\n    workgroup_size: {:?},\n    \
-         bindings: &[{bindings}],\n    structs: &[{structs}],\n    segments: &[{segments}],\n}};",
-        reflection.workgroup_size
+         bindings: &[{bindings}],\n    overrides: &{:?},\n    structs: &[{structs}],\n    segments: &[{segments}],\n}};",
+        reflection.workgroup_size, reflection.overrides
     )
     .unwrap();
 }

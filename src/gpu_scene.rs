@@ -3,8 +3,9 @@
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::recorder::Recorder;
+use crate::gpu::shader::SceneFeatures;
 use crate::scene::FlatScene;
-use crate::scene::gpu_types::{LIGHT_ENVIRONMENT, Light, NONE};
+use crate::scene::gpu_types::{LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK};
 use glam::{Quat, Vec3};
 
 /// A [`FlatScene`] on the device.
@@ -21,6 +22,7 @@ pub struct GpuScene {
     punctual: Vec<Light>,
     first_punctual: u32,
     rest_positions: Vec<Vec3>,
+    features: SceneFeatures,
 }
 
 impl GpuScene {
@@ -89,6 +91,7 @@ impl GpuScene {
             rest_positions: punctual.iter().map(|l| l.position).collect(),
             punctual,
             first_punctual: scene.first_punctual,
+            features: features(scene),
         })
     }
 
@@ -113,6 +116,7 @@ impl GpuScene {
 
     /// Binds everything for the passes of a frame.
     pub fn share<'a>(&'a self, recorder: &mut Recorder<'a>) {
+        recorder.features = self.features;
         recorder.share("nodes", &self.nodes);
         recorder.share("triangles", &self.triangles);
         recorder.share("materials", &self.materials);
@@ -120,6 +124,18 @@ impl GpuScene {
         recorder.share("atlas", &self.atlas);
         recorder.share("environment_radiance", &self.environment_radiance);
         recorder.share("environment_alias", &self.environment_alias);
+    }
+}
+
+fn features(scene: &FlatScene) -> SceneFeatures {
+    let slots = scene.materials.iter().flat_map(|m| {
+        [m.base_color_texture, m.metallic_roughness_texture, m.normal_texture, m.emissive_texture]
+    });
+    SceneFeatures {
+        textures: slots.into_iter().any(|slot| slot.width > 0),
+        alpha_masks: scene.triangles.iter().any(|t| t.flags & TRIANGLE_ALPHA_MASK != 0),
+        environment: environment_light(scene) != NONE,
+        punctual_lights: scene.lights.iter().any(|l| l.kind != LIGHT_TRIANGLE && l.kind != LIGHT_ENVIRONMENT),
     }
 }
 

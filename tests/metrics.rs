@@ -38,9 +38,13 @@ fn checker(width: u32, height: u32, square: u32) -> Image {
     image(width, height, |x, y| if (x / square + y / square) % 2 == 1 { [0.9, 0.7, 0.2] } else { [0.1, 0.2, 0.3] })
 }
 
-/// Image, reference, and what other programs say: FLIP from NVIDIA's `flip-evaluator` 1.7 (PyPI; LDR, linear input clamped to
-/// [0, 1], 67 pixels a degree; it works in single precision), SSIM from scikit-image 0.26.0 (`gaussian_weights`, sigma 1.5,
-/// population covariance, range 1, on the sRGB-encoded clamped luminance), and MSE, relMSE and MAPE from their formulas in numpy 2.4.6.
+/// Image, reference, and what other programs say.
+///
+/// * FLIP: NVIDIA's `flip-evaluator` 1.7 from PyPI (LDR, linear input clamped to [0, 1], 67 pixels a degree; it works in
+///   single precision).
+/// * SSIM: scikit-image 0.26.0 (`gaussian_weights`, sigma 1.5, population covariance, range 1) on the sRGB-encoded
+///   clamped luminance.
+/// * MSE, relMSE, MAPE: their formulas in numpy 2.4.6.
 fn cases() -> Vec<(Image, Image, [f64; 5])> {
     vec![
         (

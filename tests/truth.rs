@@ -137,14 +137,14 @@ fn planted_biases_are_caught() {
         (
             "history counted in full, offered at its cap",
             "techniques/restir-di/temporal.wgsl",
-            "combination_correct(&combination, previous, 1u, history_confidence, true);",
-            "combination_correct(&combination, previous, 1u, 2.0 * history_confidence + 1.0, true);",
+            "            confidence_weight = history_confidence;",
+            "            confidence_weight = 2.0 * history_confidence + 1.0;",
         ),
         (
-            "the neighbour's target function in place of the canonical one",
+            "neighbours offered at twice their confidence",
             "techniques/restir-di/combine.wgsl",
-            "let weight = confidence_weight * target_function(canonical, sample, false)",
-            "let weight = confidence_weight * target_function(canonical, sample, false) * (1.0 + f32(min(domain, 1u)))",
+            "let weight = reservoir.confidence_weight * target_function(canonical, sample, false)",
+            "let weight = reservoir.confidence_weight * target_function(canonical, sample, false) * f32(1u + min(domain, 1u))",
         ),
         (
             "temporal reuse with the random numbers of the initial candidates",

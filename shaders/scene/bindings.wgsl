@@ -101,6 +101,13 @@ struct Light {
     alias_light: u32,
 }
 
+// What the scene has, fixed when a pipeline is made (src/gpu_scene.rs), so that no kernel carries code that its scene
+// never runs. A software adapter executes both sides of a branch: there this is a factor of three.
+override scene_has_textures: bool = true;
+override scene_has_alpha_masks: bool = true;
+override scene_has_environment: bool = true;
+override scene_has_punctual_lights: bool = true;
+
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> nodes: array<BvhNode>;
 @group(0) @binding(2) var<storage, read> triangles: array<Triangle>;

@@ -66,7 +66,7 @@ fn intersect_triangle(index: u32, origin: vec3f, direction: vec3f, hit: ptr<func
     if u < 0.0 || v < 0.0 || u + v > 1.0 || t <= 0.0 || t >= (*hit).t {
         return;
     }
-    if (flags & TRIANGLE_ALPHA_MASK) != 0u && !passes_alpha(index, vec2f(u, v)) {
+    if scene_has_alpha_masks && (flags & TRIANGLE_ALPHA_MASK) != 0u && !passes_alpha(index, vec2f(u, v)) {
         return;
     }
     *hit = Hit(t, index, vec2f(u, v));

@@ -16,7 +16,7 @@ fn environment_texel(p: vec2i, size: vec2i) -> vec3f {
 
 // Radiance from the direction towards which a ray leaves the scene; black without an environment.
 fn environment_evaluate(direction: vec3f) -> vec3f {
-    if frame.environment_light == NONE {
+    if !scene_has_environment {
         return vec3f(0.0);
     }
     let size = vec2i(textureDimensions(environment_radiance));

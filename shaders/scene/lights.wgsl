@@ -37,7 +37,7 @@ fn light_sample(rng: ptr<function, Rng>) -> LightSample {
     if u.y >= lights[light].alias_threshold {
         light = lights[light].alias_light;
     }
-    if light == frame.environment_light {
+    if scene_has_environment && light == frame.environment_light {
         let direction = environment_sample(random_4(rng));
         return LightSample(light, pack_point(octahedral_encode(direction) * 0.5 + 0.5));
     }
@@ -51,11 +51,14 @@ fn triangle_area(triangle: u32) -> f32 {
 // Density of `light_sample` in the sample's own measure.
 fn light_sample_pdf(sample: LightSample) -> f32 {
     let pmf = lights[sample.light].pmf;
-    switch lights[sample.light].kind {
-        case LIGHT_TRIANGLE: { return pmf / triangle_area(lights[sample.light].triangle); }
-        case LIGHT_ENVIRONMENT: { return pmf * environment_pdf(environment_sample_direction(sample)); }
-        default: { return pmf; }
+    let kind = lights[sample.light].kind;
+    if kind == LIGHT_TRIANGLE {
+        return pmf / triangle_area(lights[sample.light].triangle);
     }
+    if scene_has_environment && kind == LIGHT_ENVIRONMENT {
+        return pmf * environment_pdf(environment_sample_direction(sample));
+    }
+    return pmf;
 }
 
 // Density per solid angle with which `light_sample` would have drawn the hit that a BRDF ray made on light `light`.
@@ -112,9 +115,12 @@ fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> L
         return LightContribution(direction, distance * 0.9999, emitted_radiance(triangle, uv) * (cosine / distance_2),
             distance_2 / cosine);
     }
-    if kind == LIGHT_ENVIRONMENT {
+    if scene_has_environment && kind == LIGHT_ENVIRONMENT {
         let direction = environment_sample_direction(sample);
         return LightContribution(direction, ENVIRONMENT_DISTANCE, environment_evaluate(direction), 1.0);
+    }
+    if !scene_has_punctual_lights {
+        return LightContribution(vec3f(0.0, 1.0, 0.0), 0.0, vec3f(0.0), 0.0);
     }
     if kind == LIGHT_DIRECTIONAL {
         return LightContribution(-lights[light].direction, ENVIRONMENT_DISTANCE, lights[light].intensity, 0.0);

@@ -43,7 +43,7 @@ fn triangle_point(triangle: u32, uv: vec2f) -> vec3f {
 fn emitted_radiance(triangle: u32, uv: vec2f) -> vec3f {
     let material = triangles[triangle].material;
     let emissive = materials[material].emissive;
-    if materials[material].emissive_texture.width == 0u {
+    if !scene_has_textures || materials[material].emissive_texture.width == 0u {
         return emissive;
     }
     return emissive * texture_read(materials[material].emissive_texture, triangle_uvs(triangle, uv)).rgb;
@@ -59,7 +59,7 @@ fn shading_normal(triangle: u32, uv: vec2f, uvs: vec4f) -> vec3f {
     let n = select(normalize(triangle_normal(triangle)), normalize(sum), dot(sum, sum) > 1e-12);
     let flags = triangles[triangle].flags;
     let material = triangles[triangle].material;
-    if (flags & TRIANGLE_TANGENTS) == 0u || materials[material].normal_texture.width == 0u {
+    if !scene_has_textures || (flags & TRIANGLE_TANGENTS) == 0u || materials[material].normal_texture.width == 0u {
         return n;
     }
     // MikkTSpace: interpolate tangent and bitangent without normalising, then combine.

@@ -36,7 +36,7 @@ fn texture_texel(slot: TextureSlot, p: vec2i) -> vec4f {
 
 // Linear RGBA at the texture coordinates `uvs` (set 0 in xy, set 1 in zw); white where there is no texture.
 fn texture_read(slot: TextureSlot, uvs: vec4f) -> vec4f {
-    if slot.width == 0u {
+    if !scene_has_textures || slot.width == 0u {
         return vec4f(1.0);
     }
     let uv = vec3f(select(uvs.xy, uvs.zw, (slot.flags & TEXTURE_UV_SET_1) != 0u), 1.0);

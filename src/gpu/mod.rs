@@ -11,9 +11,12 @@ pub mod binding_kind;
 pub mod shader_source;
 
 use crate::error::{Error, Result};
-use shader::{Pipeline, Shader};
+use shader::{Pipeline, SceneFeatures, Shader};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
+
+/// A pass and the scene features it was specialised for.
+type PipelineKey = (&'static str, SceneFeatures);
 
 /// How to choose a device.
 #[derive(Debug, Clone, Copy, Default)]
@@ -33,7 +36,7 @@ pub struct Gpu {
     pub has_timestamps: bool,
     adapter: wgpu::AdapterInfo,
     failure: Arc<Mutex<Option<String>>>,
-    pipelines: Arc<Mutex<HashMap<&'static str, Pipeline>>>,
+    pipelines: Arc<Mutex<HashMap<PipelineKey, Pipeline>>>,
     #[cfg(all(debug_assertions, not(target_arch = "wasm32")))]
     reloader: Arc<Mutex<Option<reload::Reloader>>>,
 }
@@ -140,12 +143,15 @@ impl Gpu {
         }
     }
 
-    /// The compute pipeline of a pass, made on first use.
-    pub fn pipeline(&self, shader: &'static Shader) -> Pipeline {
-        let Ok(mut pipelines) = self.pipelines.lock() else {
-            return shader.compute_pipeline(&self.device, shader.source);
-        };
-        pipelines.entry(shader.id).or_insert_with(|| shader.compute_pipeline(&self.device, shader.source)).clone()
+    /// The compute pipeline of a pass for scenes that have `features`, made on first use.
+    pub fn pipeline(&self, shader: &'static Shader, features: SceneFeatures) -> Pipeline {
+        // A pass that is not specialised has one pipeline for all scenes.
+        let features = if shader.overrides.is_empty() { SceneFeatures::ALL } else { features };
+        let make = || shader.compute_pipeline(&self.device, shader.source, features);
+        match self.pipelines.lock() {
+            Ok(mut pipelines) => pipelines.entry((shader.id, features)).or_insert_with(make).clone(),
+            Err(_) => make(),
+        }
     }
 
     /// Replaces pipelines whose shader files have changed on disk. Returns one line for each that could not be

@@ -1,7 +1,7 @@
 //! Recording a frame: a straight line of passes, each a compute pass of its own with a label and timestamps.
 
 use super::Gpu;
-use super::shader::{Resource, Shader};
+use super::shader::{Resource, SceneFeatures, Shader};
 use crate::error::Result;
 use glam::UVec2;
 
@@ -71,6 +71,8 @@ pub struct Recorder<'a> {
     pub encoder: wgpu::CommandEncoder,
     timer: Option<&'a mut Timer>,
     shared: Vec<(&'a str, Resource<'a>)>,
+    /// What the scene of this frame has.
+    pub features: SceneFeatures,
 }
 
 impl<'a> Recorder<'a> {
@@ -80,7 +82,7 @@ impl<'a> Recorder<'a> {
             timer.names.clear();
         }
         let encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
-        Recorder { gpu, encoder, timer, shared: Vec::new() }
+        Recorder { gpu, encoder, timer, shared: Vec::new(), features: SceneFeatures::ALL }
     }
 
     /// Binds a resource for every later pass that asks for it by name.
@@ -135,7 +137,7 @@ impl<'r> Pass<'r, '_> {
     /// `SHADER` if something the shader needs was not bound.
     pub fn dispatch(self, workgroups: [u32; 3]) -> Result<()> {
         let Pass { recorder, shader, bound } = self;
-        let pipeline = recorder.gpu.pipeline(shader);
+        let pipeline = recorder.gpu.pipeline(shader, recorder.features);
         let groups = shader.bind_groups(recorder.gpu, &pipeline.groups, &bound)?;
         let timestamp_writes = recorder.timer.as_mut().and_then(|timer| {
             let index = timer.names.len() as u32;

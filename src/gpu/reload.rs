@@ -1,5 +1,6 @@
 //! Reloading shaders from disk while the program runs (native debug builds).
 
+use super::PipelineKey;
 use super::shader::{Pipeline, table};
 use super::shader_source::{flatten, reflect};
 use std::collections::HashMap;
@@ -26,12 +27,14 @@ impl Reloader {
     }
 
     /// Rebuilds every pipeline in `pipelines` if any file changed. Returns one line for each that failed and was kept.
-    pub fn reload(&mut self, device: &wgpu::Device, pipelines: &mut HashMap<&'static str, Pipeline>) -> Vec<String> {
+    pub fn reload(&mut self, device: &wgpu::Device, pipelines: &mut HashMap<PipelineKey, Pipeline>) -> Vec<String> {
         let Some(newest) = newest(&self.folder).filter(|t| *t > self.seen) else { return Vec::new() };
         self.seen = newest;
         let mut problems = Vec::new();
         for shader in table::ALL {
-            let Some(slot) = pipelines.get_mut(shader.id) else { continue };
+            if !pipelines.keys().any(|(id, _)| *id == shader.id) {
+                continue;
+            }
             let source = flatten(&self.folder, shader.file).and_then(|flattened| {
                 let reflection = reflect(&flattened)?;
                 let same = reflection.workgroup_size == shader.workgroup_size
@@ -46,7 +49,13 @@ impl Reloader {
                 Ok(flattened.text)
             });
             match source {
-                Ok(text) => *slot = shader.compute_pipeline(device, &text),
+                Ok(text) => {
+                    for ((id, features), slot) in pipelines.iter_mut() {
+                        if *id == shader.id {
+                            *slot = shader.compute_pipeline(device, &text, *features);
+                        }
+                    }
+                }
                 Err(problem) => problems.push(problem),
             }
         }

@@ -41,6 +41,8 @@ pub struct Shader {
     pub workgroup_size: [u32; 3],
     /// By group, then index.
     pub bindings: &'static [Binding],
+    /// Scene features the shader is specialised by (`override` declarations).
+    pub overrides: &'static [&'static str],
     /// Every struct with a layout.
     pub structs: &'static [StructLayout],
     /// (first flattened line, file, line in file), sorted.
@@ -52,6 +54,36 @@ pub struct Shader {
 pub mod table {
     use super::{Binding, BindingKind, Shader, StructLayout};
     include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+}
+
+/// What a scene has: kernels leave out the code for what it has not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct SceneFeatures {
+    /// Any texture.
+    pub textures: bool,
+    /// Any triangle whose alpha has to be tested.
+    pub alpha_masks: bool,
+    /// An environment.
+    pub environment: bool,
+    /// Any point, spot or directional light.
+    pub punctual_lights: bool,
+}
+
+impl SceneFeatures {
+    /// Everything: right for every scene, fast for few.
+    pub const ALL: Self =
+        SceneFeatures { textures: true, alpha_masks: true, environment: true, punctual_lights: true };
+
+    /// The value of the shader's `override` of this name.
+    fn has(self, name: &str) -> bool {
+        match name {
+            "scene_has_textures" => self.textures,
+            "scene_has_alpha_masks" => self.alpha_masks,
+            "scene_has_environment" => self.environment,
+            "scene_has_punctual_lights" => self.punctual_lights,
+            _ => true,
+        }
+    }
 }
 
 /// A pipeline and the layouts its bind groups are made with.
@@ -92,12 +124,15 @@ impl Shader {
             .collect()
     }
 
-    /// The compute pipeline of this pass from `source` (its own, or an edited one with the same bindings).
-    pub fn compute_pipeline(&self, device: &wgpu::Device, source: &str) -> Pipeline {
+    /// The compute pipeline of this pass from `source` (its own, or an edited one with the same bindings), for scenes
+    /// that have `features`.
+    pub fn compute_pipeline(&self, device: &wgpu::Device, source: &str, features: SceneFeatures) -> Pipeline {
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(self.id),
             source: wgpu::ShaderSource::Wgsl(source.into()),
         });
+        let constants: Vec<(&str, f64)> =
+            self.overrides.iter().map(|name| (*name, f64::from(u8::from(features.has(name))))).collect();
         let groups = self.layouts(device, wgpu::ShaderStages::COMPUTE);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(self.id),
@@ -109,7 +144,7 @@ impl Shader {
             layout: Some(&layout),
             module: &module,
             entry_point: Some("main"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            compilation_options: wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() },
             cache: None,
         });
         Pipeline { pipeline, groups }

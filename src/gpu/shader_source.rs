@@ -124,6 +124,8 @@ pub struct Reflection {
     pub workgroup_size: [u32; 3],
     /// By group, then index.
     pub bindings: Vec<ReflectedBinding>,
+    /// `override` declarations.
+    pub overrides: Vec<String>,
     /// Every struct that has a layout.
     pub structs: Vec<ReflectedStruct>,
 }
@@ -165,6 +167,7 @@ pub fn reflect(flattened: &Flattened) -> Result<Reflection, String> {
             out.bindings.push(ReflectedBinding { name, group: binding.group, index: binding.binding, kind });
         }
     }
+    out.overrides = module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
     out.bindings.sort_by_key(|b| (b.group, b.index));
     if let Some(pair) = out.bindings.windows(2).find(|w| (w[0].group, w[0].index) == (w[1].group, w[1].index)) {
         return Err(format!("{} and {} share one @group/@binding", pair[0].name, pair[1].name));

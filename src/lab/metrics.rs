@@ -59,8 +59,9 @@ pub fn rmse(image: &Image, reference: &Image) -> Result<f64> {
 /// What [`relmse`] adds to the squared reference, so that black pixels do not divide by zero.
 pub const RELMSE_EPSILON: f64 = 0.01;
 
-/// Relative mean squared error, mean of (a - b)^2 / (b^2 + 0.01) over channels and pixels (Rousselle, Knaus and Zwicker,
-/// "Adaptive Sampling and Reconstruction using Greedy Error Minimization", 2011, with their epsilon).
+/// Relative mean squared error, mean of (a - b)^2 / (b^2 + 0.01) over channels and pixels (after Rousselle, Knaus and
+/// Zwicker, "Adaptive Sampling and Reconstruction using Greedy Error Minimization", 2011; the epsilon differs from
+/// author to author).
 ///
 /// # Errors
 /// As [`check_pair`].
@@ -68,8 +69,8 @@ pub fn relmse(image: &Image, reference: &Image) -> Result<f64> {
     mean_of(image, reference, |a, b| (a - b).powi(2) / (b * b + RELMSE_EPSILON))
 }
 
-/// Mean absolute percentage error, mean of |I - G| / (0.01 mean(G) + G) over pixels, I and G the [`luminance`] of image and
-/// reference (Lin's dissertation on many lights and resampling, chapter 6, footnote 12). A fraction, not percent.
+/// Mean absolute percentage error, mean of |I - G| / (0.01 mean(G) + G) over pixels, I and G the [`luminance`] of image
+/// and reference (Lin's dissertation on many lights and resampling, chapter 6, footnote 12). A fraction, not percent.
 ///
 /// A pixel without error counts 0 even where the denominator is 0; an error against an all-black reference is infinite.
 ///

@@ -48,7 +48,7 @@ fn convolve(
     out
 }
 
-/// `f` at -radius..=radius, divided by the sum of its positive values (and, if it has any, the negative ones by theirs).
+/// `f` at -radius..=radius, its positive values divided by their sum, and its negative ones by theirs.
 pub(super) fn normalised(radius: usize, f: impl Fn(f64) -> f64) -> Vec<f64> {
     let taps: Vec<f64> = (0..=2 * radius).map(|i| f(i as f64 - radius as f64)).collect();
     let positive: f64 = taps.iter().filter(|t| **t > 0.0).sum();

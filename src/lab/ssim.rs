@@ -13,8 +13,9 @@ const C2: f64 = 0.03 * 0.03;
 
 /// Mean structural similarity: 1 for equal pictures; none where a side is shorter than the window of 11 pixels.
 ///
-/// The paper's constants: Gaussian window 11x11 of standard deviation 1.5, K1 = 0.01, K2 = 0.03, range L = 1. SSIM wants
-/// bounded, perceptually even values, so radiance is mapped first: luminance, clamped to [0, 1] (exposure 0), sRGB-encoded.
+/// The paper's constants: Gaussian window 11x11 of standard deviation 1.5, K1 = 0.01, K2 = 0.03, range L = 1. SSIM
+/// wants bounded, perceptually even values, so radiance is mapped first: luminance, clamped to [0, 1] (exposure 0),
+/// sRGB-encoded.
 /// Only windows wholly inside the picture count.
 ///
 /// # Errors

@@ -10,7 +10,6 @@ use ::exr::math::Vec2;
 use ::exr::meta::attribute::{Chromaticities, Compression, LineOrder, SampleType};
 use ::exr::meta::header::{Header, LayerAttributes};
 use std::io::Cursor;
-use std::path::Path;
 
 /// A picture and what is known of it, for [`encode_exr`].
 #[derive(Debug, Clone, Copy)]
@@ -142,8 +141,8 @@ fn header_end(file: &[u8]) -> Option<usize> {
 /// A file may claim at most this many bytes of pixels a byte of its own: twice what deflate can do at best.
 const MAX_EXPANSION: u64 = 2064;
 
-/// The compressions that are read. The exr crate's decoders of B44 and DWA overflow or allocate without bound on hostile
-/// files, which no check of the header can prevent.
+/// The compressions that are read. The exr crate's decoders of B44 and DWA overflow or allocate without bound on
+/// hostile files, which no check of the header can prevent.
 const COMPRESSIONS: [Compression; 6] = [
     Compression::Uncompressed,
     Compression::RLE,
@@ -153,23 +152,24 @@ const COMPRESSIONS: [Compression; 6] = [
     Compression::PXR24,
 ];
 
-/// Reads the colour of an EXR file: channels `R`, `G`, `B`, or `Y` for grey, in 16- or 32-bit float, in any order, from
-/// the first part that has them. Other channels are passed over.
+/// [`decode_exr`] of a file.
 ///
 /// # Errors
 /// [`Error::Io`]; otherwise as [`decode_exr`].
-pub fn read_exr(path: &Path) -> Result<Image> {
+#[cfg(not(target_arch = "wasm32"))]
+pub fn read_exr(path: &std::path::Path) -> Result<Image> {
     let name = path.display().to_string();
     let bytes = std::fs::read(path).map_err(|source| Error::Io { path: name.clone(), source })?;
     decode_exr(&name, &bytes)
 }
 
-/// [`read_exr`] from memory; `name` is what errors call the file.
+/// Reads the colour of an EXR file: channels `R`, `G`, `B`, or `Y` for grey, in 16- or 32-bit float, in any order, from
+/// the first part that has them. Other channels are passed over. `name` is what errors call the file.
 ///
 /// # Errors
-/// [`Error::BadFile`] for a broken file or one that claims more pixels than [`MAX_SIDE`] squared or than its bytes could
-/// hold (checked before anything is allocated for them); [`Error::Unsupported`] for deep or subsampled pixels and for B44 and DWA
-/// compression.
+/// [`Error::BadFile`] for a broken file, or one that claims more pixels than [`MAX_SIDE`] squared or than its bytes
+/// could hold (checked before anything is allocated for them); [`Error::Unsupported`] for deep or subsampled pixels and
+/// for B44 and DWA compression.
 pub fn decode_exr(name: &str, bytes: &[u8]) -> Result<Image> {
     let bad = |place: &str, what: String| Error::bad_file(name, place, what);
     let library = |place: &str, error: ::exr::error::Error| match error {

@@ -1,12 +1,18 @@
 //! Image files: PNG for people, OpenEXR for measurements, each written whole or not at all.
 
+#[cfg(not(target_arch = "wasm32"))]
 pub mod atomic;
 pub mod exr;
 pub mod png;
 
-pub use atomic::{check_writable, write_atomic};
-pub use exr::{ExrPicture, decode_exr, encode_exr, read_exr};
-pub use png::{encode_png, write_png};
+pub use exr::{ExrPicture, decode_exr, encode_exr};
+pub use png::encode_png;
+#[cfg(not(target_arch = "wasm32"))]
+pub use {
+    atomic::{check_writable, write_atomic},
+    exr::read_exr,
+    png::write_png,
+};
 
 use crate::error::{Error, Result};
 

@@ -1,10 +1,9 @@
 //! PNG, for people: display-referred sRGB, 8 bits a channel.
 
-use super::{check_size, write_atomic};
+use super::check_size;
 use crate::error::{Error, Result};
 use image::ImageEncoder;
 use image::codecs::png::PngEncoder;
-use std::path::Path;
 
 /// Encodes `rgba`, 4 bytes a pixel, already tone-mapped and sRGB-encoded, row-major from the top.
 ///
@@ -25,7 +24,8 @@ pub fn encode_png(width: u32, height: u32, rgba: &[u8]) -> Result<Vec<u8>> {
 /// [`encode_png`] to a file, whole or not at all.
 ///
 /// # Errors
-/// As [`encode_png`] and [`write_atomic`].
-pub fn write_png(path: &Path, width: u32, height: u32, rgba: &[u8]) -> Result<()> {
-    write_atomic(path, &encode_png(width, height, rgba)?)
+/// As [`encode_png`] and [`super::write_atomic`].
+#[cfg(not(target_arch = "wasm32"))]
+pub fn write_png(path: &std::path::Path, width: u32, height: u32, rgba: &[u8]) -> Result<()> {
+    super::write_atomic(path, &encode_png(width, height, rgba)?)
 }

@@ -38,7 +38,7 @@ fn weighted_emission(surface: Surface, direction: vec3f, distance: f32, brdf_pdf
 }
 
 fn weighted_environment(direction: vec3f, brdf_pdf: f32) -> vec3f {
-    if frame.environment_light == NONE {
+    if !scene_has_environment {
         return vec3f(0.0);
     }
     return environment_evaluate(direction) * mis_weight(frame.mis_heuristic, brdf_pdf, environment_hit_pdf(direction));

@@ -26,13 +26,13 @@ fn combination_empty() -> Combination {
 
 // Step 1, once a domain: offers the domain's sample. `canonical` is the surface of the pixel that combines.
 fn combination_offer(combination: ptr<function, Combination>, canonical: Surface, reservoir: Reservoir, domain: u32,
-    confidence_weight: f32, u: f32) {
-    (*combination).stream.confidence_sum += confidence_weight;
+    u: f32) {
+    (*combination).stream.confidence_sum += reservoir.confidence_weight;
     if reservoir.unbiased_contribution_weight <= 0.0 {
         return;
     }
     let sample = reservoir_sample(reservoir);
-    let weight = confidence_weight * target_function(canonical, sample, false)
+    let weight = reservoir.confidence_weight * target_function(canonical, sample, false)
         * reservoir.unbiased_contribution_weight;
     // By way of a copy: WGSL's base language has no pointers to members as arguments.
     var stream = (*combination).stream;

@@ -37,8 +37,10 @@ fn reuse_pixel(pixel: vec2u) {
     let surface = load_pixel(pixel);
     var rng = rng_new(pixel, frame.index, frame.seed, STREAM_SPATIAL + pass_index.value);
 
-    var neighbors: array<vec2u, MAXIMUM_NEIGHBORS>;
-    var neighbor_count = 0u;
+    // Domain 0 is the pixel itself, the others are those neighbours that are like enough.
+    var domains: array<vec2u, MAXIMUM_NEIGHBORS + 1u>;
+    domains[0] = pixel;
+    var domain_count = 1u;
     for (var i = 0u; i < params.spatial_neighbors; i += 1u) {
         let offset = sample_disk(random_2(&rng)) * params.spatial_radius;
         let candidate = vec2i(floor(vec2f(pixel) + 0.5 + offset));
@@ -47,23 +49,20 @@ fn reuse_pixel(pixel: vec2u) {
         }
         let neighbor = vec2u(candidate);
         if pixel_has_surface(neighbor) && is_similar(surface, load_pixel(neighbor)) {
-            neighbors[neighbor_count] = neighbor;
-            neighbor_count += 1u;
+            domains[domain_count] = neighbor;
+            domain_count += 1u;
         }
     }
 
     for (var slot = 0u; slot < slot_count(); slot += 1u) {
-        let own = reservoirs[reservoir_index(pixel, slot)];
         var combination = combination_empty();
-        combination_offer(&combination, surface, own, 0u, own.confidence_weight, random_1(&rng));
-        for (var i = 0u; i < neighbor_count; i += 1u) {
-            let reservoir = reservoirs[reservoir_index(neighbors[i], slot)];
-            combination_offer(&combination, surface, reservoir, i + 1u, reservoir.confidence_weight, random_1(&rng));
+        for (var domain = 0u; domain < domain_count; domain += 1u) {
+            let reservoir = reservoirs[reservoir_index(domains[domain], slot)];
+            combination_offer(&combination, surface, reservoir, domain, random_1(&rng));
         }
-        combination_correct(&combination, surface, 0u, own.confidence_weight, false);
-        for (var i = 0u; i < neighbor_count; i += 1u) {
-            let reservoir = reservoirs[reservoir_index(neighbors[i], slot)];
-            combination_correct(&combination, load_pixel(neighbors[i]), i + 1u, reservoir.confidence_weight, false);
+        for (var domain = 0u; domain < domain_count; domain += 1u) {
+            let confidence_weight = reservoirs[reservoir_index(domains[domain], slot)].confidence_weight;
+            combination_correct(&combination, load_pixel(domains[domain]), domain, confidence_weight, false);
         }
         reservoirs_out[reservoir_index(pixel, slot)] = combination_finish(combination, surface);
     }

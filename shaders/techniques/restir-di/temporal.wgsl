@@ -35,11 +35,25 @@ fn combine_slot(pixel: vec2u, previous_pixel: vec2u, slot: u32, surface: Surface
     let history = reservoirs_previous[reservoir_index(previous_pixel, slot)];
     let history_confidence = min(history.confidence_weight, params.history_cap * current.confidence_weight);
     let u = random_2(rng);
+    // Domain 0 is this frame's pixel, domain 1 the previous frame's. Loops rather than two calls: each call is inlined.
     var combination = combination_empty();
-    combination_offer(&combination, surface, current, 0u, current.confidence_weight, u.x);
-    combination_offer(&combination, surface, history, 1u, history_confidence, u.y);
-    combination_correct(&combination, surface, 0u, current.confidence_weight, false);
-    combination_correct(&combination, previous, 1u, history_confidence, true);
+    for (var domain = 0u; domain < 2u; domain += 1u) {
+        var reservoir = current;
+        if domain == 1u {
+            reservoir = history;
+            reservoir.confidence_weight = history_confidence;
+        }
+        combination_offer(&combination, surface, reservoir, domain, u[domain]);
+    }
+    for (var domain = 0u; domain < 2u; domain += 1u) {
+        var seen_from = surface;
+        var confidence_weight = current.confidence_weight;
+        if domain == 1u {
+            seen_from = previous;
+            confidence_weight = history_confidence;
+        }
+        combination_correct(&combination, seen_from, domain, confidence_weight, domain == 1u);
+    }
     reservoirs_out[reservoir_index(pixel, slot)] = combination_finish(combination, surface);
 }
 
