@@ -128,9 +128,10 @@ impl GpuScene {
 }
 
 fn features(scene: &FlatScene) -> SceneFeatures {
-    let slots = scene.materials.iter().flat_map(|m| {
-        [m.base_color_texture, m.metallic_roughness_texture, m.normal_texture, m.emissive_texture]
-    });
+    let slots = scene
+        .materials
+        .iter()
+        .flat_map(|m| [m.base_color_texture, m.metallic_roughness_texture, m.normal_texture, m.emissive_texture]);
     SceneFeatures {
         textures: slots.into_iter().any(|slot| slot.width > 0),
         alpha_masks: scene.triangles.iter().any(|t| t.flags & TRIANGLE_ALPHA_MASK != 0),

@@ -6,7 +6,7 @@ mod support;
 use glam::UVec2;
 use restir::Error;
 use restir::gpu::recorder::Recorder;
-use restir::gpu::shader::table;
+use restir::gpu::shader::{SceneFeatures, table};
 use restir::gpu::shader_source::{flatten, reflect};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -65,9 +65,12 @@ impl Drop for TemporaryFolder {
 #[test]
 fn every_pass_builds_a_pipeline() {
     let gpu = fresh_gpu();
+    let bare = SceneFeatures { textures: false, alpha_masks: false, environment: false, punctual_lights: false };
     for shader in table::ALL.iter().filter(|s| s.workgroup_size[0] > 0) {
-        gpu.pipeline(shader);
-        gpu.check().unwrap_or_else(|e| panic!("{}: {e}", shader.file));
+        for features in [SceneFeatures::ALL, bare] {
+            gpu.pipeline(shader, features);
+            gpu.check().unwrap_or_else(|e| panic!("{} for {features:?}: {e}", shader.file));
+        }
     }
     let shader = &table::FILM_BLIT;
     let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -97,6 +100,18 @@ fn every_pass_builds_a_pipeline() {
     });
     gpu.check().expect("the blit's pipeline");
     assert!(table::ALL.iter().filter(|s| s.workgroup_size[0] == 0).count() == 1, "a render pass is not tried here");
+}
+
+/// A name that `SceneFeatures` does not know would always be true, and nothing would be left out.
+#[test]
+fn every_override_is_a_scene_feature() {
+    let known = ["scene_has_textures", "scene_has_alpha_masks", "scene_has_environment", "scene_has_punctual_lights"];
+    for shader in table::ALL {
+        for name in shader.overrides {
+            assert!(known.contains(name), "{}: override {name}", shader.file);
+        }
+    }
+    assert!(table::ALL.iter().any(|shader| shader.overrides.len() == known.len()));
 }
 
 #[test]
@@ -208,7 +223,7 @@ fn edits_show_at_once_and_broken_edits_change_nothing() {
     }
     let gpu = fresh_gpu();
     gpu.watch_shaders(&folder.0);
-    let mut renderer = renderer(&gpu, builtin("cornell"), [16, 12], "normals", &[]);
+    let mut renderer = renderer(&gpu, builtin("cornell"), [16, 16], "normals", &[]);
     let before = render(&mut renderer, 1);
     assert!(renderer.shader_problems.is_empty(), "{:?}", renderer.shader_problems);
 
@@ -228,19 +243,19 @@ fn edits_show_at_once_and_broken_edits_change_nothing() {
     folder.write(file, &edited.replace("2.0 * color", "2.0 * colour"), 20);
     renderer.reset();
     let broken = render(&mut renderer, 1);
-    assert_eq!(broken, after, "the old pipeline is kept");
+    assert_same(&broken, &after, "the old pipeline is kept");
     assert_eq!(renderer.shader_problems.len(), 1, "{:?}", renderer.shader_problems);
     assert!(renderer.shader_problems[0].contains(&format!("{file}:{line}")), "{:?}", renderer.shader_problems);
 
     let rebound = edited.replace("@binding(3) var<uniform> params", "@binding(7) var<uniform> params");
     folder.write(file, &rebound, 30);
     renderer.reset();
-    assert_eq!(render(&mut renderer, 1), after, "an edit that changes bindings is not taken");
+    assert_same(&render(&mut renderer, 1), &after, "an edit that changes bindings is not taken");
     assert!(renderer.shader_problems[0].contains("rebuild"), "{:?}", renderer.shader_problems);
 
     folder.write(file, &original, 40);
     renderer.reset();
-    assert_eq!(render(&mut renderer, 1), before);
+    assert_same(&render(&mut renderer, 1), &before, "the edit is undone");
     assert!(renderer.shader_problems.is_empty());
 }
 

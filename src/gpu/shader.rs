@@ -71,8 +71,7 @@ pub struct SceneFeatures {
 
 impl SceneFeatures {
     /// Everything: right for every scene, fast for few.
-    pub const ALL: Self =
-        SceneFeatures { textures: true, alpha_masks: true, environment: true, punctual_lights: true };
+    pub const ALL: Self = SceneFeatures { textures: true, alpha_masks: true, environment: true, punctual_lights: true };
 
     /// The value of the shader's `override` of this name.
     fn has(self, name: &str) -> bool {

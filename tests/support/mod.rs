@@ -56,3 +56,13 @@ pub fn mean(image: &Image) -> f64 {
     let sum: f64 = image.pixels.iter().flatten().map(|c| f64::from(*c)).sum();
     sum / (3 * image.pixels.len()) as f64
 }
+
+/// Whether two pictures are the same bit for bit; says where they first differ.
+#[track_caller]
+pub fn assert_same(actual: &Image, expected: &Image, what: &str) {
+    assert_eq!((actual.width, actual.height), (expected.width, expected.height), "{what}");
+    let mut pixels = actual.pixels.iter().zip(&expected.pixels).enumerate();
+    if let Some((i, (a, b))) = pixels.find(|(_, (a, b))| a.map(f32::to_bits) != b.map(f32::to_bits)) {
+        panic!("{what}: pixel {i} is {a:?}, should be {b:?}");
+    }
+}
