@@ -52,7 +52,7 @@ crate::params! {
         spatial_normal_threshold: float(0.9, -1.0..=1.0, "cosine"),
         /// Samples that a pixel keeps. 4: less noise, four times the memory and shadow rays. Unbiased either way.
         reservoir_size: choice(0, ["1", "4"]),
-        /// How joined reservoirs are weighted. none divides by all confidence (1/M), 1/z by that of pixels that could have made the sample, mis by the balance heuristic: all three are biased, darkening shadow edges and corners; mis-visibility traces shadow rays to do it right and is unbiased.
+        /// How joined reservoirs are weighted. none divides by all confidence (1/M) and is biased; 1/z divides by that of pixels that could have made the sample, mis weights by the balance heuristic, and both are biased while visibility_reuse is on; mis-visibility traces shadow rays and is unbiased.
         bias_correction: choice(3, ["none", "1/z", "mis", "mis-visibility"]),
         /// Add indirect light from the path tracer's later bounces. Off: direct light only, faster, and darker than the truth.
         indirect: flag(true),
@@ -65,8 +65,8 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
     summary: "Direct light by spatiotemporal reservoir resampling, indirect light by path tracing.",
     papers: &["Bitterli et al. 2020", "thesis 001, section 5", "Lin 2022 (dissertation), chapter 6 for conventions"],
     unbiased: true,
-    bias: "Unbiased with bias_correction = mis-visibility (the default); with none, 1/z and mis biased towards dark where \
-           visibility differs between the pixels that share samples.",
+    bias: "Unbiased with bias_correction = mis-visibility (the default). none is biased towards dark; 1/z and mis are while \
+           visibility_reuse is on, where visibility differs between the pixels that share samples.",
     params: RestirDiParams::SPECS,
     views: &["direct", "indirect", "contribution weight", "confidence weight", "light"],
     layouts: &[Reservoir::LAYOUT, RestirDiParams::LAYOUT],
