@@ -172,7 +172,7 @@ fn planted_biases_are_caught() {
     ];
     for (what, file, old, new) in plants {
         let folder = ShaderCopy::new();
-        let gpu = support::gpu();
+        let gpu = fresh_gpu();
         let mut renderer = restir(&gpu, &[]);
         render(&mut renderer, 1);
         gpu.watch_shaders(&folder.0);

@@ -1,0 +1,200 @@
+//! Scenes whose radiance can be written down: a glTF surface under a point light, a rectangle, an even sky, a spot and a
+//! directional light, and a furnace. `path-tracer` and `restir-di` (unbiased) must both give the number.
+//!
+//! The expected values integrate the specification's BRDF (support/twins.rs) in f64; where the light has extent the
+//! estimate is noisy, and the mean of independent runs must lie within 4 standard errors and 1 %.
+
+mod support;
+
+use glam::{DVec3, Vec3};
+use restir::scene::{Camera, Environment, Instance, Material, Projection, PunctualKind, PunctualLight, Scene, shapes};
+use std::f64::consts::PI;
+use support::twins::Brdf;
+use support::*;
+
+/// A horizontal square at the origin, four metres a side, seen along a direction `angle` radians from its normal by an
+/// orthographic camera that covers a millimetre: every pixel has the same answer.
+fn plate(material: Material, angle: f32) -> Scene {
+    let wo = Vec3::new(angle.sin(), angle.cos(), 0.0);
+    let mut camera = Camera::look_at("test", wo, Vec3::ZERO, 1.0);
+    camera.projection = Projection::Orthographic { half_height: 0.0005 };
+    Scene {
+        name: "plate".into(),
+        meshes: vec![shapes::parallelogram(Vec3::new(-2.0, 0.0, 2.0), Vec3::X * 4.0, Vec3::Z * -4.0, 0)],
+        instances: vec![Instance { mesh: 0, transform: glam::Mat4::IDENTITY }],
+        materials: vec![material],
+        cameras: vec![camera],
+        ..Scene::default()
+    }
+}
+
+fn materials() -> Vec<(Material, Brdf)> {
+    [([0.8, 0.5, 0.2], 0.0, 1.0), ([0.9, 0.6, 0.3], 1.0, 0.5), ([0.2, 0.4, 0.7], 0.5, 0.4)]
+        .map(|(color, metallic, roughness)| {
+            let base = Vec3::from(color);
+            let material = Material { base_color: base.extend(1.0), metallic, roughness, ..Material::default() };
+            let roughness = f64::from(roughness);
+            (material, Brdf { base_color: base.as_dvec3(), metallic: metallic.into(), alpha: roughness * roughness })
+        })
+        .to_vec()
+}
+
+/// World directions (y up) as the BRDF's local ones (z up); the surface is isotropic.
+fn local(v: DVec3) -> DVec3 {
+    DVec3::new(v.x, v.z, v.y)
+}
+
+/// f(wo, wi) cos, for a world direction to the light.
+fn scattered(brdf: &Brdf, angle: f64, wi: DVec3) -> DVec3 {
+    if wi.y <= 0.0 {
+        return DVec3::ZERO;
+    }
+    brdf.value(DVec3::new(angle.sin(), 0.0, angle.cos()), local(wi)) * wi.y
+}
+
+/// The mean picture of either technique is `expected`, channel by channel.
+fn check(scene: &Scene, expected: DVec3, what: &str) {
+    let flat = flatten(scene);
+    for technique in ["path-tracer", "restir-di"] {
+        let mut renderer = renderer(&gpu(), flat.clone(), [16, 16], technique, &[("render.max_depth", "1")]);
+        if technique == "restir-di" {
+            renderer.set("indirect", "no").expect("a setting");
+        }
+        let runs: Vec<DVec3> = (0..24)
+            .map(|seed| {
+                renderer.set_seed(seed);
+                let image = render(&mut renderer, 32);
+                let sum: DVec3 = image.pixels.iter().map(|p| Vec3::from(*p).as_dvec3()).sum();
+                sum / image.pixels.len() as f64
+            })
+            .collect();
+        let n = runs.len() as f64;
+        let mean = runs.iter().sum::<DVec3>() / n;
+        let variance = runs.iter().map(|r| (*r - mean) * (*r - mean)).sum::<DVec3>() / (n * (n - 1.0));
+        let error = DVec3::new(variance.x.sqrt(), variance.y.sqrt(), variance.z.sqrt());
+        println!("{what}, {technique}: {mean:.5} ± {error:.5}, expected {expected:.5}");
+        for channel in 0..3 {
+            let distance = (mean[channel] - expected[channel]).abs();
+            // f32 arithmetic and 16-bit points on lights are good for 1e-4; the rest is noise.
+            let allowed = 4.0 * error[channel] + 1e-4 * expected[channel];
+            assert!(distance <= allowed, "{what}, {technique}: {mean} is not {expected} (± {error})");
+            assert!(allowed < 0.01 * expected[channel], "{what}, {technique}: too noisy to tell ({error})");
+        }
+    }
+}
+
+#[test]
+fn under_a_point_light() {
+    for (index, (material, brdf)) in materials().into_iter().enumerate() {
+        let mut scene = plate(material, 0.6);
+        let at = DVec3::new(-0.7, 1.1, 0.4);
+        let intensity = DVec3::new(3.0, 2.0, 1.0);
+        scene.lights.push(PunctualLight {
+            kind: PunctualKind::Point,
+            position: at.as_vec3(),
+            direction: Vec3::NEG_Y,
+            intensity: intensity.as_vec3(),
+            range: f32::INFINITY,
+        });
+        let expected = scattered(&brdf, 0.6, at.normalize()) * intensity / at.length_squared();
+        check(&scene, expected, &format!("point light, material {index}"));
+    }
+}
+
+#[test]
+fn under_a_spot_and_a_directional_light() {
+    let (material, brdf) = materials().remove(0);
+    let at = DVec3::new(0.5, 1.5, -0.2);
+    let axis = (DVec3::new(0.3, 0.0, 0.2) - at).normalize();
+    let (inner, outer) = (0.1f64, 0.6f64);
+    let light = |kind, direction: DVec3, intensity: Vec3, range| PunctualLight {
+        kind,
+        position: at.as_vec3(),
+        direction: direction.as_vec3(),
+        intensity,
+        range,
+    };
+    // KHR_lights_punctual: angular falloff squared, window 1 - (d / range)^4.
+    let cosine = (-at.normalize()).dot(axis);
+    let cone = ((cosine - outer.cos()) / (inner.cos() - outer.cos())).clamp(0.0, 1.0).powi(2);
+    assert!(cone > 0.05 && cone < 0.95, "the plate lies between the cones: {cone}");
+    let window = 1.0 - (at.length() / 4.0).powi(4);
+    let mut scene = plate(material.clone(), 0.3);
+    let kind = PunctualKind::Spot { inner: inner as f32, outer: outer as f32 };
+    scene.lights.push(light(kind, axis, Vec3::new(5.0, 5.0, 4.0), 4.0));
+    let irradiance = DVec3::new(5.0, 5.0, 4.0) * cone * window / at.length_squared();
+    check(&scene, scattered(&brdf, 0.3, at.normalize()) * irradiance, "spot light");
+
+    let sun = DVec3::new(0.4, -1.0, 0.1).normalize();
+    let mut scene = plate(material, 0.3);
+    scene.lights.push(light(PunctualKind::Directional, sun, Vec3::new(0.5, 0.6, 0.7), f32::INFINITY));
+    check(&scene, scattered(&brdf, 0.3, -sun) * DVec3::new(0.5, 0.6, 0.7), "directional light");
+}
+
+#[test]
+fn under_a_rectangle() {
+    for (index, (material, brdf)) in materials().into_iter().enumerate() {
+        let mut scene = plate(material, 0.5);
+        // Faces down; two triangles, 0.6 m x 0.4 m, 0.9 m above and off to the side where the highlight is.
+        let (corner, u, v) = (DVec3::new(-0.9, 0.9, -0.2), DVec3::X * 0.6, DVec3::Z * 0.4);
+        let radiance = DVec3::new(4.0, 5.0, 6.0);
+        scene.materials.push(Material { emissive: radiance.as_vec3(), ..Material::default() });
+        scene.meshes.push(shapes::parallelogram(corner.as_vec3(), u.as_vec3(), v.as_vec3(), 1));
+        scene.instances.push(Instance { mesh: 1, transform: glam::Mat4::IDENTITY });
+        let n = 400;
+        let mut expected = DVec3::ZERO;
+        for i in 0..n {
+            for j in 0..n {
+                let p = corner + u * ((f64::from(i) + 0.5) / f64::from(n)) + v * ((f64::from(j) + 0.5) / f64::from(n));
+                let wi = p.normalize();
+                expected += scattered(&brdf, 0.5, wi) * radiance * (wi.y / p.length_squared());
+            }
+        }
+        expected *= u.length() * v.length() / f64::from(n * n);
+        check(&scene, expected, &format!("rectangle, material {index}"));
+    }
+}
+
+#[test]
+fn under_an_even_sky() {
+    for (index, (material, brdf)) in materials().into_iter().enumerate() {
+        let angle = 0.7;
+        let mut scene = plate(material, angle as f32);
+        scene.environment = Some(Environment::even(Vec3::new(1.0, 0.9, 0.8)));
+        check(&scene, albedo(&brdf, angle) * DVec3::new(1.0, 0.9, 0.8), &format!("even sky, material {index}"));
+    }
+}
+
+/// Directional albedo: the integral of f cos over the hemisphere.
+fn albedo(brdf: &Brdf, angle: f64) -> DVec3 {
+    let (rings, sectors) = (600, 1200);
+    let mut sum = DVec3::ZERO;
+    for i in 0..rings {
+        let theta = (f64::from(i) + 0.5) / f64::from(rings) * PI / 2.0;
+        for j in 0..sectors {
+            let phi = (f64::from(j) + 0.5) / f64::from(sectors) * 2.0 * PI;
+            let wi = DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
+            sum += scattered(brdf, angle, wi) * theta.sin();
+        }
+    }
+    sum * (PI / 2.0 / f64::from(rings)) * (2.0 * PI / f64::from(sectors))
+}
+
+/// A sphere of the furnace's material in an even environment: at the middle of the picture it is seen head on, so its
+/// radiance is the albedo at normal incidence; round it the environment shows as it is.
+#[test]
+fn in_a_furnace() {
+    let mut scene = restir::scene::builtin::make("furnace").expect("a built-in scene");
+    let material = &scene.materials[0];
+    let roughness = f64::from(material.roughness);
+    let brdf = Brdf {
+        base_color: material.base_color.truncate().as_dvec3(),
+        metallic: material.metallic.into(),
+        alpha: roughness * roughness,
+    };
+    let camera = &mut scene.cameras[0];
+    camera.projection = Projection::Orthographic { half_height: 0.002 };
+    check(&scene, albedo(&brdf, 0.0), "furnace, head on");
+    scene.cameras[0] = Camera::look_at("away", Vec3::new(0.0, 0.0, 50.0), Vec3::new(0.0, 0.0, 100.0), 0.5);
+    check(&scene, DVec3::ONE, "furnace, the environment");
+}
