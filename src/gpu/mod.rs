@@ -12,6 +12,7 @@ pub mod shader_source;
 
 use crate::error::{Error, Result};
 use shader::{Pipeline, SceneFeatures, Shader};
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
@@ -147,21 +148,33 @@ impl Gpu {
     pub fn pipeline(&self, shader: &'static Shader, features: SceneFeatures) -> Pipeline {
         // A pass that is not specialised has one pipeline for all scenes.
         let features = if shader.overrides.is_empty() { SceneFeatures::ALL } else { features };
-        let make = || shader.compute_pipeline(&self.device, shader.source, features);
+        let make = || shader.compute_pipeline(&self.device, &self.shader_source(shader), features);
         match self.pipelines.lock() {
             Ok(mut pipelines) => pipelines.entry((shader.id, features)).or_insert_with(make).clone(),
             Err(_) => make(),
         }
     }
 
+    /// A pass's text: as edited while the program runs (native debug builds), or as built.
+    fn shader_source(&self, shader: &'static Shader) -> Cow<'static, str> {
+        #[cfg(all(debug_assertions, not(target_arch = "wasm32")))]
+        if let Ok(reloader) = self.reloader.lock()
+            && let Some(reloader) = reloader.as_ref()
+        {
+            return reloader.source(shader).to_owned().into();
+        }
+        shader.source.into()
+    }
+
     /// Replaces pipelines whose shader files have changed on disk. Returns one line for each that could not be
     /// replaced and keeps its old pipeline. Native debug builds only; elsewhere nothing happens.
     pub fn reload_shaders(&self) -> Vec<String> {
         #[cfg(all(debug_assertions, not(target_arch = "wasm32")))]
-        if let (Ok(mut reloader), Ok(mut pipelines)) = (self.reloader.lock(), self.pipelines.lock())
+        // Pipelines first, as `pipeline` does: one order of locks.
+        if let (Ok(mut pipelines), Ok(mut reloader)) = (self.pipelines.lock(), self.reloader.lock())
             && let Some(reloader) = reloader.as_mut()
         {
-            return reloader.reload(&self.device, &mut pipelines);
+            return reloader.reload(&mut pipelines);
         }
         Vec::new()
     }

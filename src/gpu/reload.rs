@@ -1,8 +1,8 @@
 //! Reloading shaders from disk while the program runs (native debug builds).
 
 use super::PipelineKey;
-use super::shader::{Pipeline, table};
-use super::shader_source::{flatten, reflect};
+use super::shader::{Pipeline, Shader, table};
+use super::shader_source::{Flattened, flatten, reflect};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -12,12 +12,18 @@ use std::time::SystemTime;
 pub struct Reloader {
     folder: PathBuf,
     seen: SystemTime,
+    /// Flattened text of every shader that was edited, by id.
+    edited: HashMap<&'static str, String>,
 }
 
 impl Reloader {
     /// Watches `folder`; only changes from now on count.
     pub fn new(folder: &Path) -> Self {
-        Reloader { folder: folder.to_owned(), seen: newest(folder).unwrap_or(SystemTime::UNIX_EPOCH) }
+        Reloader {
+            folder: folder.to_owned(),
+            seen: newest(folder).unwrap_or(SystemTime::UNIX_EPOCH),
+            edited: HashMap::new(),
+        }
     }
 
     /// Watches the folder this program was built from, if it is still there.
@@ -26,40 +32,47 @@ impl Reloader {
         folder.is_dir().then(|| Self::new(&folder))
     }
 
-    /// Rebuilds every pipeline in `pipelines` if any file changed. Returns one line for each that failed and was kept.
-    pub fn reload(&mut self, device: &wgpu::Device, pipelines: &mut HashMap<PipelineKey, Pipeline>) -> Vec<String> {
+    /// Takes up every shader whose text changed and drops its pipelines, so that the next use makes them anew. Returns one
+    /// line for each that does not compile; it keeps its old text and pipelines.
+    pub fn reload(&mut self, pipelines: &mut HashMap<PipelineKey, Pipeline>) -> Vec<String> {
         let Some(newest) = newest(&self.folder).filter(|t| *t > self.seen) else { return Vec::new() };
         self.seen = newest;
         let mut problems = Vec::new();
         for shader in table::ALL {
-            if !pipelines.keys().any(|(id, _)| *id == shader.id) {
-                continue;
-            }
-            let source = flatten(&self.folder, shader.file).and_then(|flattened| {
-                let reflection = reflect(&flattened)?;
-                let same = reflection.workgroup_size == shader.workgroup_size
-                    && reflection.bindings.len() == shader.bindings.len()
-                    && reflection.bindings.iter().zip(shader.bindings).all(|(new, old)| {
-                        (new.name.as_str(), new.group, new.index, new.kind)
-                            == (old.name, old.group, old.index, old.kind)
-                    });
-                if !same {
-                    return Err(format!("{}: bindings or workgroup size changed; rebuild the program", shader.file));
-                }
-                Ok(flattened.text)
-            });
-            match source {
-                Ok(text) => {
-                    for ((id, features), slot) in pipelines.iter_mut() {
-                        if *id == shader.id {
-                            *slot = shader.compute_pipeline(device, &text, *features);
-                        }
+            match flatten(&self.folder, shader.file) {
+                Ok(flattened) if flattened.text == self.source(shader) => {}
+                Ok(flattened) => match same_interface(shader, &flattened) {
+                    Ok(()) => {
+                        self.edited.insert(shader.id, flattened.text);
+                        pipelines.retain(|(id, _), _| *id != shader.id);
                     }
-                }
+                    Err(problem) => problems.push(problem),
+                },
                 Err(problem) => problems.push(problem),
             }
         }
         problems
+    }
+
+    /// The text a shader's pipelines are made from: as edited, or as built.
+    pub fn source<'a>(&'a self, shader: &'a Shader) -> &'a str {
+        self.edited.get(shader.id).map_or(shader.source, String::as_str)
+    }
+}
+
+/// Whether an edited pass is valid and binds what the built one does, for that is what the program knows how to bind.
+fn same_interface(shader: &Shader, flattened: &Flattened) -> Result<(), String> {
+    let reflection = reflect(flattened)?;
+    let bindings = |name, group, index, kind| (name, group, index, kind);
+    let new = reflection.bindings.iter().map(|b| bindings(b.name.as_str(), b.group, b.index, b.kind));
+    let old = shader.bindings.iter().map(|b| bindings(b.name, b.group, b.index, b.kind));
+    let same = reflection.workgroup_size == shader.workgroup_size
+        && reflection.overrides.iter().eq(shader.overrides.iter())
+        && new.eq(old);
+    if same {
+        Ok(())
+    } else {
+        Err(format!("{}: bindings, overrides or workgroup size changed; rebuild the program", shader.file))
     }
 }
 
