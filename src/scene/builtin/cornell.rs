@@ -8,7 +8,7 @@ use std::f32::consts::TAU;
 const WHITE: Vec3 = Vec3::new(0.725, 0.71, 0.68);
 const RED: Vec3 = Vec3::new(0.63, 0.065, 0.05);
 const GREEN: Vec3 = Vec3::new(0.14, 0.45, 0.091);
-const LIGHT: Vec3 = Vec3::new(34.0, 26.0, 15.0);
+const LIGHT: Vec3 = Vec3::new(46.0, 38.0, 28.0);
 /// The ceiling light along x and z.
 const LIGHT_SIZE: [f32; 2] = [0.24, 0.2];
 
