@@ -38,10 +38,10 @@ pub struct Frame {
     pub scene_radius: f32,
     /// 1 if the previous frame's buffers may be read.
     pub history: u32,
+    /// 0 box, 1 centre.
+    pub pixel_filter: u32,
     /// Unused.
-    pub padding_0: u32,
-    /// Unused.
-    pub padding_1: u32,
+    pub padding: u32,
 }
 }
 

@@ -224,6 +224,8 @@ params! {
         roulette_minimum: float(0.05, 0.001..=1.0, ""),
         /// Throughput at which a path always goes on, T_threshold of thesis 000 Eq. 24. Higher: paths end sooner, more noise. Unbiased at any value.
         roulette_threshold: float(1.0, 0.001..=100.0, ""),
+        /// Where in its pixel a primary ray goes: `box` anywhere in the square, which averages to a smooth picture; `center` through the middle, which keeps edges out of error measurements but aliases (biased against the box filter).
+        pixel_filter: choice(0, ["box", "center"]),
     }
 }
 

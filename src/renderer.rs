@@ -68,7 +68,7 @@ pub struct Renderer {
     frame_index: u32,
     accumulated: u32,
     restart_film: bool,
-    /// One line for each shader edit that did not compile (debug builds).
+    /// One line for each shader whose last edit did not compile (debug builds).
     pub shader_problems: Vec<String>,
 }
 
@@ -285,7 +285,9 @@ impl Renderer {
     /// `LIMIT` if the technique's buffers do not fit; `DEVICE` for an error the device has reported.
     pub fn render_frame(&mut self) -> Result<()> {
         self.gpu.check()?;
-        self.shader_problems = self.gpu.reload_shaders();
+        if let Some(problems) = self.gpu.reload_shaders() {
+            self.shader_problems = problems;
+        }
         let size = self.size();
         if !self.technique_ready {
             self.technique.prepare(&self.gpu, size)?;
@@ -364,8 +366,8 @@ impl Renderer {
             view: self.view,
             scene_radius: 0.5 * (high - low).length(),
             history: (self.frame_index > 0).into(),
-            padding_0: 0,
-            padding_1: 0,
+            pixel_filter: self.render_params.pixel_filter,
+            padding: 0,
         }
     }
 

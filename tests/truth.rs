@@ -143,7 +143,8 @@ fn planted_biases_are_caught() {
             "no shadow ray when shading",
             "techniques/common/resampling.wgsl",
             "if luminance(unshadowed) <= 0.0 || !is_visible(surface, light.direction, light.distance) {",
-            "if luminance(unshadowed) <= 0.0 {",
+            "let lit = is_visible(surface, light.direction, light.distance);\n    \
+             if luminance(unshadowed) <= 0.0 || (!lit && light.distance < 0.0) {",
         ),
         (
             "history counted in full, offered at its cap",

@@ -30,8 +30,8 @@ struct Frame {
     view: u32, // the technique's debug view; 0 is radiance
     scene_radius: f32, // metres
     history: u32, // 1 if the previous frame's buffers may be read
-    padding_0: u32,
-    padding_1: u32,
+    pixel_filter: u32, // PIXEL_FILTER_BOX or PIXEL_FILTER_CENTER
+    padding: u32,
 }
 
 struct BvhNode {

@@ -17,10 +17,15 @@ fn camera_ray(camera: CameraView, film: vec2f) -> Ray {
     return Ray(camera.position, normalize(camera.forward + offset));
 }
 
-// This frame's ray of a pixel: uniform over the pixel's square (box filter). The same for every pass of the frame.
+const PIXEL_FILTER_BOX = 0u;
+const PIXEL_FILTER_CENTER = 1u;
+
+// This frame's ray of a pixel: uniform over the pixel's square (box filter), or through its centre. The same for every
+// pass of the frame.
 fn primary_ray(pixel: vec2u) -> Ray {
     var rng = rng_new(pixel, frame.index, frame.seed, STREAM_PRIMARY);
-    return camera_ray(frame.camera, vec2f(pixel) + random_2(&rng));
+    let offset = select(random_2(&rng), vec2f(0.5), frame.pixel_filter == PIXEL_FILTER_CENTER);
+    return camera_ray(frame.camera, vec2f(pixel) + offset);
 }
 
 // Unit direction from a point to the camera.

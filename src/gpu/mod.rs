@@ -166,9 +166,9 @@ impl Gpu {
         shader.source.into()
     }
 
-    /// Replaces pipelines whose shader files have changed on disk. Returns one line for each that could not be
-    /// replaced and keeps its old pipeline. Native debug builds only; elsewhere nothing happens.
-    pub fn reload_shaders(&self) -> Vec<String> {
+    /// Replaces pipelines whose shader files have changed on disk. Nothing changed: `None`. Else one line for each that
+    /// could not be replaced and keeps its old pipeline. Native debug builds only; elsewhere nothing happens.
+    pub fn reload_shaders(&self) -> Option<Vec<String>> {
         #[cfg(all(debug_assertions, not(target_arch = "wasm32")))]
         // Pipelines first, as `pipeline` does: one order of locks.
         if let (Ok(mut pipelines), Ok(mut reloader)) = (self.pipelines.lock(), self.reloader.lock())
@@ -176,7 +176,7 @@ impl Gpu {
         {
             return reloader.reload(&mut pipelines);
         }
-        Vec::new()
+        None
     }
 
     /// Reloads shaders from another folder than the one the program was built from.

@@ -32,10 +32,10 @@ impl Reloader {
         folder.is_dir().then(|| Self::new(&folder))
     }
 
-    /// Takes up every shader whose text changed and drops its pipelines, so that the next use makes them anew. Returns one
-    /// line for each that does not compile; it keeps its old text and pipelines.
-    pub fn reload(&mut self, pipelines: &mut HashMap<PipelineKey, Pipeline>) -> Vec<String> {
-        let Some(newest) = newest(&self.folder).filter(|t| *t > self.seen) else { return Vec::new() };
+    /// Takes up every shader whose text changed and drops its pipelines, so that the next use makes them anew. No file
+    /// changed: `None`. Else one line for each shader that does not compile; it keeps its old text and pipelines.
+    pub fn reload(&mut self, pipelines: &mut HashMap<PipelineKey, Pipeline>) -> Option<Vec<String>> {
+        let newest = newest(&self.folder).filter(|t| *t > self.seen)?;
         self.seen = newest;
         let mut problems = Vec::new();
         for shader in table::ALL {
@@ -51,7 +51,7 @@ impl Reloader {
                 Err(problem) => problems.push(problem),
             }
         }
-        problems
+        Some(problems)
     }
 
     /// The text a shader's pipelines are made from: as edited, or as built.
