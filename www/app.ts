@@ -65,7 +65,7 @@ class App {
       const scene = this.flatten(this.firstSource());
       scene.catch(() => undefined);
       const [adapter, module] = await Promise.all([findAdapter(), this.compiled]);
-      this.resolution.startAt(adapter.software ? 0.5 : 1);
+      this.resolution.startAt(adapter.software ? 0.25 : 1);
       await init({ module_or_path: module });
       this.description = JSON.parse(describe()) as Description;
       this.listen();

@@ -30,11 +30,12 @@ test('shows a first picture of cornell within 5 s of navigation', { skip: browse
     assert.match(state.status, /\d+ frames? · .* ms/);
   }));
 
-// Two drivers never agree in every bit: a ray that grazes an edge takes another path. Nearly all pixels must
-// agree to within a rounding step of the display, and what differs must not shift the mean.
+// Two drivers never agree in every bit: a ray that grazes an edge takes another path. Nearly all values must agree to
+// within a rounding step of the display, and what differs must not shift the mean. Measured: Firefox, whose driver is
+// the command line's, agrees in every byte; Chromium on SwiftShader in 99.9 % of them, with a mean off by 0.005.
 const closeBytes = 2;
-const closeShare = 0.98;
-const meanDifference = 0.5;
+const closeShare = 0.995;
+const meanDifference = 0.1;
 
 function assertSamePicture(actual, expected) {
   assert.equal(actual.length, expected.length);
