@@ -50,6 +50,10 @@ crate::params! {
         spatial_depth_threshold: float(0.1, 0.0..=10.0, "of depth"),
         /// Smallest cosine between the normals of a pixel and its neighbour. Lower: reuse round corners. Adds no bias with mis-visibility.
         spatial_normal_threshold: float(0.9, -1.0..=1.0, "cosine"),
+        /// Spatial reuse is for pixels whose own confidence weight is below this, as after a disocclusion: a neighbour's one sample, however sure, is noise beside a long history. Higher: more pixels reuse; above history_cap + 1 all do, as in Bitterli et al. 2020. Lower: less time. Adds no bias, for confidence does not depend on samples.
+        spatial_confidence_limit: float(8.0, 0.0..=10000.0, "frames"),
+        /// Make what spatial reuse found the next frame's history, as Bitterli et al. 2020. On: samples spread further; neighbours become correlated, and what noise they bring stays. Unbiased either way with mis-visibility.
+        spatial_feedback: flag(false),
         /// Samples that a pixel keeps. 4: less noise, four times the memory and shadow rays. Unbiased either way.
         reservoir_size: choice(0, ["1", "4"]),
         /// How joined reservoirs are weighted. none divides by all confidence (1/M) and is biased; 1/z divides by that of pixels that could have made the sample, mis weights by the balance heuristic, and both are biased while visibility_reuse is on; mis-visibility traces shadow rays and is unbiased.
@@ -163,6 +167,7 @@ impl Technique for RestirDi {
                 .dispatch_over(size)?;
             std::mem::swap(&mut current, &mut spare);
         }
+        let found_in_time = current;
         if self.params.spatial_reuse == 1 {
             for pass_index in self.pass_indices.iter().take(self.params.spatial_iterations as usize) {
                 recorder
@@ -172,7 +177,11 @@ impl Technique for RestirDi {
                     .bind("reservoirs", &reservoirs[current])
                     .bind("reservoirs_out", &reservoirs[spare])
                     .dispatch_over(size)?;
-                std::mem::swap(&mut current, &mut spare);
+                // What this pass read is free now, unless it is the next frame's history.
+                let free =
+                    if self.params.spatial_feedback == 0 && current == found_in_time { history } else { current };
+                current = spare;
+                spare = free;
             }
         }
         if self.params.indirect == 1 {
@@ -184,7 +193,7 @@ impl Technique for RestirDi {
             .bind("reservoirs", &reservoirs[current])
             .bind("indirect_radiance", &buffers.indirect)
             .dispatch_over(size)?;
-        buffers.history = current;
+        buffers.history = if self.params.spatial_feedback == 1 { current } else { found_in_time };
         Ok(())
     }
 }

@@ -21,12 +21,14 @@ fn candidate_weight(surface: Surface, sample: LightSample, candidate_count: u32)
     return target_function(surface, sample, false) / (pdf * f32(candidate_count));
 }
 
-// W of a stream's selected sample: its weight sum over its target function; zero where nothing was selected.
+// W of a stream's selected sample: its weight sum over its target function; zero where nothing was selected. A quotient
+// that is not finite is dropped here, for reuse would spread it over the picture and keep it for ever.
 fn stream_contribution_weight(stream: Stream, target_value: f32) -> f32 {
-    if target_value <= 0.0 {
+    let weight = stream.weight_sum / max(target_value, 1e-30);
+    if target_value <= 0.0 || is_nan(weight) || is_infinite(weight) {
         return 0.0;
     }
-    return stream.weight_sum / target_value;
+    return weight;
 }
 
 // f L G of a light sample, without the visibility V.

@@ -14,15 +14,18 @@ struct RestirDiParams {
     spatial_radius: f32,
     spatial_depth_threshold: f32,
     spatial_normal_threshold: f32,
+    spatial_confidence_limit: f32,
+    spatial_feedback: u32,
     reservoir_size: u32,
     bias_correction: u32,
     indirect: u32,
 }
 
-const BIAS_CORRECTION_NONE = 0u; // m = c / sum c
-const BIAS_CORRECTION_Z = 1u; // the same over the pixels whose target function is not zero
-const BIAS_CORRECTION_MIS = 2u; // balance heuristic over target functions
-const BIAS_CORRECTION_MIS_VISIBILITY = 3u; // the same with visibility: unbiased
+// What they mean: combine.wgsl.
+const BIAS_CORRECTION_NONE = 0u;
+const BIAS_CORRECTION_Z = 1u;
+const BIAS_CORRECTION_MIS = 2u;
+const BIAS_CORRECTION_MIS_VISIBILITY = 3u;
 
 const MAXIMUM_RESERVOIR_SIZE = 4u;
 

@@ -45,7 +45,11 @@ fn pixel_radiance(pixel: vec2u) -> vec3f {
         case VIEW_CONTRIBUTION_WEIGHT: {
             return vec3f(first.unbiased_contribution_weight * target_function(surface, reservoir_sample(first), false));
         }
-        case VIEW_CONFIDENCE_WEIGHT: { return vec3f(first.confidence_weight / (params.history_cap + 1.0)); }
+        // White at what one pixel's history can hold; neighbours add theirs, so the scale is that of the pass before them.
+        case VIEW_CONFIDENCE_WEIGHT: {
+            let neighbors = f32(params.spatial_reuse * params.spatial_iterations * params.spatial_neighbors);
+            return vec3f(first.confidence_weight / ((params.history_cap + 1.0) * (1.0 + neighbors)));
+        }
         case VIEW_LIGHT: { return light_color(first.light); }
         default: {}
     }

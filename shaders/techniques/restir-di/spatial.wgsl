@@ -10,8 +10,6 @@ struct PassIndex {
     value: u32,
 }
 
-const MAXIMUM_NEIGHBORS = 16u;
-
 @group(1) @binding(4) var<storage, read> reservoirs: array<Reservoir>;
 @group(1) @binding(5) var<storage, read_write> reservoirs_out: array<Reservoir>;
 @group(1) @binding(6) var<uniform> pass_index: PassIndex;
@@ -28,7 +26,8 @@ fn is_similar(surface: Surface, neighbor: Surface) -> bool {
 }
 
 fn reuse_pixel(pixel: vec2u) {
-    if !pixel_has_surface(pixel) {
+    if !pixel_has_surface(pixel)
+        || reservoirs[reservoir_index(pixel, 0u)].confidence_weight >= params.spatial_confidence_limit {
         for (var slot = 0u; slot < slot_count(); slot += 1u) {
             reservoirs_out[reservoir_index(pixel, slot)] = reservoirs[reservoir_index(pixel, slot)];
         }
@@ -38,9 +37,9 @@ fn reuse_pixel(pixel: vec2u) {
     var rng = rng_new(pixel, frame.index, frame.seed, STREAM_SPATIAL + pass_index.value);
 
     // Domain 0 is the pixel itself, the others are those neighbours that are like enough.
-    var domains: array<vec2u, MAXIMUM_NEIGHBORS + 1u>;
+    var domains: array<vec2u, MAXIMUM_DOMAINS>;
     domains[0] = pixel;
-    var domain_count = 1u;
+    var found = 1u;
     for (var i = 0u; i < params.spatial_neighbors; i += 1u) {
         let offset = sample_disk(random_2(&rng)) * params.spatial_radius;
         let candidate = vec2i(floor(vec2f(pixel) + 0.5 + offset));
@@ -49,22 +48,21 @@ fn reuse_pixel(pixel: vec2u) {
         }
         let neighbor = vec2u(candidate);
         if pixel_has_surface(neighbor) && is_similar(surface, load_pixel(neighbor)) {
-            domains[domain_count] = neighbor;
-            domain_count += 1u;
+            domains[found] = neighbor;
+            found += 1u;
         }
     }
 
     for (var slot = 0u; slot < slot_count(); slot += 1u) {
-        var combination = combination_empty();
-        for (var domain = 0u; domain < domain_count; domain += 1u) {
-            let reservoir = reservoirs[reservoir_index(domains[domain], slot)];
-            combination_offer(&combination, surface, reservoir, domain, random_1(&rng));
+        combination_begin();
+        for (var j = 0u; j < found; j += 1u) {
+            combination_offer(reservoirs[reservoir_index(domains[j], slot)]);
         }
-        for (var domain = 0u; domain < domain_count; domain += 1u) {
-            let confidence_weight = reservoirs[reservoir_index(domains[domain], slot)].confidence_weight;
-            combination_correct(&combination, load_pixel(domains[domain]), domain, confidence_weight, false);
+        let needed = select(1u, found, needs_every_domain());
+        for (var j = 0u; j < needed; j += 1u) {
+            combination_value(load_pixel(domains[j]), j, false);
         }
-        reservoirs_out[reservoir_index(pixel, slot)] = combination_finish(combination, surface);
+        reservoirs_out[reservoir_index(pixel, slot)] = combination_finish(&rng);
     }
 }
 

@@ -32,29 +32,20 @@ fn is_same_surface(surface: Surface, previous: Surface) -> bool {
 fn combine_slot(pixel: vec2u, previous_pixel: vec2u, slot: u32, surface: Surface, previous: Surface,
     rng: ptr<function, Rng>) {
     let current = reservoirs[reservoir_index(pixel, slot)];
-    let history = reservoirs_previous[reservoir_index(previous_pixel, slot)];
-    let history_confidence = min(history.confidence_weight, params.history_cap * current.confidence_weight);
-    let u = random_2(rng);
-    // Domain 0 is this frame's pixel, domain 1 the previous frame's. Loops rather than two calls: each call is inlined.
-    var combination = combination_empty();
-    for (var domain = 0u; domain < 2u; domain += 1u) {
-        var reservoir = current;
-        if domain == 1u {
-            reservoir = history;
-            reservoir.confidence_weight = history_confidence;
+    var history = reservoirs_previous[reservoir_index(previous_pixel, slot)];
+    history.confidence_weight = min(history.confidence_weight, params.history_cap * current.confidence_weight);
+    combination_begin();
+    combination_offer(current);
+    combination_offer(history);
+    // A loop rather than two calls, for each call is inlined.
+    for (var j = 0u; j < 2u; j += 1u) {
+        var domain = surface;
+        if j == 1u {
+            domain = previous;
         }
-        combination_offer(&combination, surface, reservoir, domain, u[domain]);
+        combination_value(domain, j, j == 1u);
     }
-    for (var domain = 0u; domain < 2u; domain += 1u) {
-        var seen_from = surface;
-        var confidence_weight = current.confidence_weight;
-        if domain == 1u {
-            seen_from = previous;
-            confidence_weight = history_confidence;
-        }
-        combination_correct(&combination, seen_from, domain, confidence_weight, domain == 1u);
-    }
-    reservoirs_out[reservoir_index(pixel, slot)] = combination_finish(combination, surface);
+    reservoirs_out[reservoir_index(pixel, slot)] = combination_finish(rng);
 }
 
 fn keep(pixel: vec2u) {

@@ -53,7 +53,10 @@ pub(super) fn many_lights(count: &str) -> Result<Scene> {
     }
     for (i, mut mesh) in lights(count).into_iter().enumerate().filter(|(_, mesh)| !mesh.indices.is_empty()) {
         mesh.material = scene.materials.len() as u32;
-        let emissive = hue((i as f32 + 1.0) / COLORS as f32) * RADIANCE;
+        // Tints rather than pure hues: a reservoir keeps one light, and how its colour differs from the mean is noise that
+        // no resampling by luminance removes.
+        let tint = Vec3::ONE.lerp(hue((i as f32 + 1.0) / COLORS as f32), 0.3);
+        let emissive = tint * RADIANCE;
         scene.materials.push(Material { emissive, ..matte("light", Vec3::ZERO) });
         place(&mut scene, mesh, Mat4::IDENTITY);
     }
