@@ -4,6 +4,7 @@ mod support;
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use restir::gpu::shader::table;
+use restir::scene::gpu_types::{TRIANGLE_BITANGENT_SHIFT, TRIANGLE_TANGENTS};
 use restir::scene::random::Random;
 use restir::scene::{
     AlphaMode, Environment, FlatScene, Instance, Material, PunctualKind, PunctualLight, Scene, Texture, TextureRef,
@@ -72,6 +73,17 @@ fn random_numbers_are_bit_exact() {
                 .map(|bits| ((bits >> 8) as f32 * (0.5f32).powi(24)).to_bits())
         };
         assert_eq!((output.a, output.b), (draw(0), draw(1)), "{input:?}");
+    }
+}
+
+#[test]
+fn words_below_a_bound_are_exact() {
+    let mut random = Random::new(16);
+    let mut cases: Vec<[u32; 2]> = (0..4096).map(|i| [random.next_u32(), random.next_u32() >> (i % 32)]).collect();
+    cases.extend([[u32::MAX; 2], [u32::MAX, 1], [0, u32::MAX], [u32::MAX, 1 << 20], [1 << 31, 3]]);
+    let inputs: Vec<_> = cases.iter().map(|[bits, n]| TestInput::new(&[[*bits, *n, 0, 0]])).collect();
+    for ([bits, n], output) in cases.iter().zip(functions(functions::BITS_BELOW, &inputs)) {
+        assert_eq!(u64::from(output.a[0]), u64::from(*bits) * u64::from(*n) >> 32, "{bits} below {n}");
     }
 }
 
@@ -663,6 +675,122 @@ fn environment_directions_follow_the_convention() {
     scene.environment = None;
     let none = scene_functions(&flatten(&scene), scene_functions::ENVIRONMENT, &inputs[..1]);
     assert_eq!(none[0].a()[..3], [0.0; 3], "no environment is black");
+}
+
+#[test]
+fn the_poles_of_the_environment_are_defined() {
+    let mut scene = floor(Material::default());
+    scene.environment = Some(Environment { width: 1, height: 2, pixels: vec![[1.0; 3], [2.0; 3]] });
+    let directions = [Vec3::Y, Vec3::NEG_Y, Vec3::new(-0.0, 1.0, -0.0), Vec3::new(-0.0, -1.0, -0.0)];
+    let inputs: Vec<_> = directions.iter().map(|w| TestInput::floats(&[w.extend(0.0).to_array()])).collect();
+    for (w, output) in directions.iter().zip(scene_functions(&flatten(&scene), scene_functions::ENVIRONMENT, &inputs)) {
+        let (v, radiance) = if w.y > 0.0 { (0.0, 1.0) } else { (1.0, 2.0) };
+        let [r, g, b, pdf] = output.a();
+        assert_eq!([r, g, b], [radiance; 3], "{w}");
+        assert!(pdf > 0.0 && pdf.is_finite(), "{w}: density {pdf}");
+        assert!((output.b()[0] - 0.5).abs() < 1e-6 && (output.b()[1] - v).abs() < 1e-4, "{w}: {:?}", output.b());
+    }
+}
+
+#[test]
+fn masked_light_shines_only_where_it_is() {
+    let reference = TextureRef { texture: 0, uv_set: 0, offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE };
+    let mut scene = floor(Material {
+        emissive: Vec3::ONE,
+        alpha: AlphaMode::Mask(0.5),
+        base_color_texture: Some(reference),
+        ..Material::default()
+    });
+    // Left half there, right half cut away.
+    scene.textures.push(Texture {
+        name: "mask".into(),
+        width: 2,
+        height: 1,
+        pixels: Arc::new(vec![255, 255, 255, 255, 255, 255, 255, 0]),
+        wrap: [Wrap::Clamp; 2],
+        linear_filter: false,
+    });
+    let flat = flatten(&scene);
+    let mut random = Random::new(17);
+    let cases: Vec<(u32, u32)> = (0..1000).map(|_| (random.next_u32() % 2, random.next_u32())).collect();
+    let above = Vec3::new(0.1, 2.0, 0.2).extend(0.0).to_array().map(f32::to_bits);
+    let inputs: Vec<_> = cases.iter().map(|(light, point)| TestInput::new(&[above, [*light, *point, 0, 0]])).collect();
+    let mut lit = 0;
+    for ((light, point), output) in
+        cases.iter().zip(scene_functions(&flat, scene_functions::LIGHT_CONTRIBUTION, &inputs))
+    {
+        let triangle = &flat.triangles[flat.lights[*light as usize].triangle as usize];
+        let [r, v] = [point & 0xffff, point >> 16].map(|q| (f64::from(q) + 0.5) / 65536.0);
+        let (b1, b2) = (r.sqrt() * (1.0 - v), r.sqrt() * v);
+        let u = (1.0 - b1 - b2) * f64::from(triangle.uv_a.x)
+            + b1 * f64::from(triangle.uv_a.z)
+            + b2 * f64::from(triangle.uv_b.x);
+        if (u - 0.5).abs() > 1e-4 {
+            assert_eq!(output.a()[0] > 0.0, u < 0.5, "u = {u}");
+            lit += i32::from(u < 0.5);
+        }
+    }
+    assert!((400..600).contains(&lit), "half of the floor is lit: {lit}");
+}
+
+/// The combination of MikkTSpace: interpolated normal, tangent and bitangent, none of them normalised, weighted by the
+/// texel.
+#[test]
+fn mapped_normals_follow_mikktspace() {
+    let reference = TextureRef { texture: 0, uv_set: 0, offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE };
+    let texel = [220u8, 90, 180, 255];
+    let mut scene = floor(Material { normal_texture: Some(reference), normal_scale: 0.7, ..Material::default() });
+    scene.textures.push(Texture {
+        name: "normal".into(),
+        width: 1,
+        height: 1,
+        pixels: Arc::new(texel.to_vec()),
+        wrap: [Wrap::Repeat; 2],
+        linear_filter: false,
+    });
+    let mut flat = flatten(&scene);
+    // Corner normals far apart, so that their mean is much shorter than 1; tangents as they come.
+    let mut random = Random::new(18);
+    let triangle = &mut flat.triangles[0];
+    let [n0, n1, n2] = [Vec3::new(0.9, 0.4, 0.0), Vec3::new(-0.7, 0.5, 0.5), Vec3::new(-0.1, 0.4, -0.9)];
+    (triangle.normal_0, triangle.normal_1, triangle.normal_2) =
+        (octahedral::pack(n0.normalize()), octahedral::pack(n1.normalize()), octahedral::pack(n2.normalize()));
+    triangle.tangents = random.next_u32();
+    // Tangents present, the bitangent of corner 1 turned, the angle of corner 2.
+    triangle.flags |= TRIANGLE_TANGENTS | 1 << (TRIANGLE_BITANGENT_SHIFT + 1) | 0x5a3c << 16;
+    let angles = [triangle.tangents & 0xffff, triangle.tangents >> 16, triangle.flags >> 16];
+    let corners = [triangle.normal_0, triangle.normal_1, triangle.normal_2].map(octahedral::unpack);
+    let flags = triangle.flags;
+
+    let uvs: Vec<Vec2> = (0..200)
+        .map(|_| {
+            let u = random.unit();
+            Vec2::new(u, random.unit() * (1.0 - u))
+        })
+        .collect();
+    let inputs: Vec<_> =
+        uvs.iter().map(|uv| TestInput::new(&[[0; 4], [uv.x.to_bits(), uv.y.to_bits(), 0, 0]])).collect();
+    let mut told_apart = 0;
+    for (uv, output) in uvs.iter().zip(scene_functions(&flat, scene_functions::SHADING_NORMAL, &inputs)) {
+        let weights = [1.0 - uv.x - uv.y, uv.x, uv.y].map(f64::from);
+        let (mut n, mut t, mut b) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        for corner in 0..3 {
+            let (tangent, bitangent) = octahedral::orthonormal_basis(corners[corner]);
+            let (sin, cos) = (f64::from(angles[corner]) * TAU / 65536.0).sin_cos();
+            let tangent = d(tangent) * cos + d(bitangent) * sin;
+            let sign = if flags >> (TRIANGLE_BITANGENT_SHIFT as usize + corner) & 1 == 0 { 1.0 } else { -1.0 };
+            n += weights[corner] * d(corners[corner]);
+            t += weights[corner] * tangent;
+            b += weights[corner] * sign * d(corners[corner]).cross(tangent);
+        }
+        let [x, y, z, _] = texel.map(|c| f64::from(c) / 255.0 * 2.0 - 1.0);
+        let expected = (t * (0.7 * x) + b * (0.7 * y) + n * z).normalize();
+        let actual = d(xyz(output.a()));
+        assert!(actual.distance(expected) < 1e-4, "{uv}: {actual} is not {expected}");
+        let wrong = (t * (0.7 * x) + b * (0.7 * y) + n.normalize() * z).normalize();
+        told_apart += i32::from(wrong.distance(expected) > 0.05);
+    }
+    assert!(told_apart > 100, "a normalised normal would pass: {told_apart}");
 }
 
 #[test]

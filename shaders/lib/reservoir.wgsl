@@ -3,7 +3,7 @@
 #include "lib/math.wgsl"
 
 // A point on a light, in primary form: which light, and two 16-bit numbers in [0, 1) that mean barycentrics (after
-// `sample_triangle`), an octahedral direction, or nothing, by the kind of light.
+// `sample_triangle`), the coordinates of the environment map, or nothing, by the kind of light.
 struct LightSample {
     light: u32,
     point: u32,
@@ -46,12 +46,19 @@ fn reservoir_sample(reservoir: Reservoir) -> LightSample {
     return LightSample(reservoir.light, reservoir.point);
 }
 
+fn pack_cell(cell: vec2u) -> u32 {
+    return cell.x | (cell.y << 16u);
+}
+
+fn unpack_cell(point: u32) -> vec2u {
+    return vec2u(point & 0xffffu, point >> 16u);
+}
+
 fn pack_point(u: vec2f) -> u32 {
-    let q = min(vec2u(u * 65536.0), vec2u(65535u));
-    return q.x | (q.y << 16u);
+    return pack_cell(min(vec2u(u * 65536.0), vec2u(65535u)));
 }
 
 // The centre of the cell that `pack_point` chose: never exactly 0 or 1.
 fn unpack_point(point: u32) -> vec2f {
-    return (vec2f(vec2u(point & 0xffffu, point >> 16u)) + 0.5) / 65536.0;
+    return (vec2f(unpack_cell(point)) + 0.5) / 65536.0;
 }

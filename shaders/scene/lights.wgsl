@@ -27,21 +27,20 @@ fn light_sample_barycentrics(sample: LightSample) -> vec2f {
 }
 
 fn environment_sample_direction(sample: LightSample) -> vec3f {
-    return octahedral_decode(unpack_point(sample.point) * 2.0 - 1.0);
+    return environment_direction(unpack_point(sample.point));
 }
 
 // Draws a light by its probability and a point on it.
 fn light_sample(rng: ptr<function, Rng>) -> LightSample {
-    let u = random_4(rng);
-    var light = min(u32(u.x * f32(frame.light_count)), frame.light_count - 1u);
-    if u.y >= lights[light].alias_threshold {
+    let bits = random_bits(rng);
+    var light = bits_below(bits.x, frame.light_count);
+    if bits_to_unit(bits.y) >= lights[light].alias_threshold {
         light = lights[light].alias_light;
     }
     if scene_has_environment && light == frame.environment_light {
-        let direction = environment_sample(random_4(rng));
-        return LightSample(light, pack_point(octahedral_encode(direction) * 0.5 + 0.5));
+        return LightSample(light, environment_sample(bits.zw, random_4(rng).xyz));
     }
-    return LightSample(light, pack_point(u.zw));
+    return LightSample(light, pack_cell(bits.zw >> vec2u(16u)));
 }
 
 fn triangle_area(triangle: u32) -> f32 {
@@ -56,7 +55,7 @@ fn light_sample_pdf(sample: LightSample) -> f32 {
         return pmf / triangle_area(lights[sample.light].triangle);
     }
     if scene_has_environment && kind == LIGHT_ENVIRONMENT {
-        return pmf * environment_pdf(environment_sample_direction(sample));
+        return pmf * environment_point_pdf(sample.point);
     }
     return pmf;
 }

@@ -39,8 +39,11 @@ fn triangle_point(triangle: u32, uv: vec2f) -> vec3f {
     return p0 + uv.x * (triangles[triangle].p1 - p0) + uv.y * (triangles[triangle].p2 - p0);
 }
 
-// Radiance that a point of an emissive triangle sends out of its front.
+// Radiance that a point of an emissive triangle sends out of its front; black where its alpha mask cuts it away.
 fn emitted_radiance(triangle: u32, uv: vec2f) -> vec3f {
+    if scene_has_alpha_masks && (triangles[triangle].flags & TRIANGLE_ALPHA_MASK) != 0u && !passes_alpha(triangle, uv) {
+        return vec3f(0.0);
+    }
     let material = triangles[triangle].material;
     let emissive = materials[material].emissive;
     if !scene_has_textures || materials[material].emissive_texture.width == 0u {
@@ -56,13 +59,14 @@ fn shading_normal(triangle: u32, uv: vec2f, uvs: vec4f) -> vec3f {
     let n1 = decode_normal(triangles[triangle].normal_1);
     let n2 = decode_normal(triangles[triangle].normal_2);
     let sum = w.x * n0 + w.y * n1 + w.z * n2;
-    let n = select(normalize(triangle_normal(triangle)), normalize(sum), dot(sum, sum) > 1e-12);
+    let has_normal = dot(sum, sum) > 1e-12;
+    let n = normalize(select(triangle_normal(triangle), sum, has_normal));
     let flags = triangles[triangle].flags;
     let material = triangles[triangle].material;
     if !scene_has_textures || (flags & TRIANGLE_TANGENTS) == 0u || materials[material].normal_texture.width == 0u {
         return n;
     }
-    // MikkTSpace: interpolate tangent and bitangent without normalising, then combine.
+    // MikkTSpace: interpolate tangent, bitangent and normal without normalising, then combine.
     let packed = triangles[triangle].tangents;
     let t0 = corner_tangent(n0, packed & 0xffffu);
     let t1 = corner_tangent(n1, packed >> 16u);
@@ -73,7 +77,7 @@ fn shading_normal(triangle: u32, uv: vec2f, uvs: vec4f) -> vec3f {
         + w.z * bitangent_sign(flags, 2u) * cross(n2, t2);
     let texel = texture_read(materials[material].normal_texture, uvs).xyz * 2.0 - 1.0;
     let scale = materials[material].normal_scale;
-    let bent = t * (texel.x * scale) + b * (texel.y * scale) + n * texel.z;
+    let bent = t * (texel.x * scale) + b * (texel.y * scale) + select(n, sum, has_normal) * texel.z;
     return select(n, normalize(bent), dot(bent, bent) > 1e-12);
 }
 

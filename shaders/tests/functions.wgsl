@@ -24,6 +24,7 @@ const STREAM_OF_FOUR = 12u;
 const STREAM_MERGED = 13u;
 const POINTS = 14u;
 const CLASSIFY = 15u;
+const BITS_BELOW = 16u;
 
 // Streams the four weights of `weights` under the index they have there, from `first` on.
 fn stream_of(weights: vec4f, first: u32, count: u32, rng: ptr<function, Rng>) -> Stream {
@@ -93,6 +94,7 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
             let point = pack_point(a.xy);
             return TestOutput(vec4u(point, 0u, 0u, 0u), bits(vec4f(unpack_point(point), 0.0, 0.0)));
         }
+        case BITS_BELOW: { return TestOutput(vec4u(bits_below(input.a.x, input.a.y), 0u, 0u, 0u), vec4u(0u)); }
         case CLASSIFY: {
             return TestOutput(vec4u(u32(is_nan(a.x)), u32(is_infinite(a.x)), 0u, 0u), vec4u(0u));
         }

@@ -13,6 +13,7 @@ const ENVIRONMENT = 4u;
 const ENVIRONMENT_SAMPLE = 5u;
 const CAMERA = 6u;
 const OFFSET_ORIGIN = 7u;
+const SHADING_NORMAL = 8u;
 
 fn evaluate(operation: u32, input: TestInput) -> TestOutput {
     let a = float(input.a);
@@ -44,12 +45,20 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
             return TestOutput(bits_3(environment_evaluate(a.xyz), environment_pdf(a.xyz)),
                 bits(vec4f(environment_uv(a.xyz), 0.0, 0.0)));
         }
-        case ENVIRONMENT_SAMPLE: { return TestOutput(bits_3(environment_sample(a), 0.0), vec4u(0u)); }
+        case ENVIRONMENT_SAMPLE: {
+            let point = environment_sample(input.b.xy, a.xyz);
+            return TestOutput(bits_3(environment_direction(unpack_point(point)), environment_point_pdf(point)),
+                vec4u(point, 0u, 0u, 0u));
+        }
         // Out along the ray of a film point, and back to the film.
         case CAMERA: {
             let ray = camera_ray(frame.camera, a.xy);
             return TestOutput(bits(vec4f(project(frame.camera, ray.origin + a.z * ray.direction), 0.0, 0.0)),
                 bits_3(ray.direction, 0.0));
+        }
+        // At the point b.xy of the triangle input.a.x.
+        case SHADING_NORMAL: {
+            return TestOutput(bits_3(shading_normal(input.a.x, b.xy, triangle_uvs(input.a.x, b.xy)), 0.0), vec4u(0u));
         }
         case OFFSET_ORIGIN: { return TestOutput(bits_3(offset_origin(a.xyz, b.xyz), 0.0), vec4u(0u)); }
         default: { return TestOutput(vec4u(0u), vec4u(0u)); }

@@ -58,6 +58,7 @@ pub mod functions {
     pub const STREAM_MERGED: u32 = 13;
     pub const POINTS: u32 = 14;
     pub const CLASSIFY: u32 = 15;
+    pub const BITS_BELOW: u32 = 16;
 }
 
 /// Operations of `shaders/tests/scene_functions.wgsl`.
@@ -70,6 +71,7 @@ pub mod scene_functions {
     pub const ENVIRONMENT_SAMPLE: u32 = 5;
     pub const CAMERA: u32 = 6;
     pub const OFFSET_ORIGIN: u32 = 7;
+    pub const SHADING_NORMAL: u32 = 8;
 }
 
 impl TestInput {
