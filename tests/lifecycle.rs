@@ -400,7 +400,7 @@ fn what_does_not_fit_leaves_what_there_was() {
 #[test]
 fn pass_times_include_the_display() {
     if !gpu().has_timestamps {
-        return eprintln!("skipped: this device cannot time passes");
+        return skip("pass_times_include_the_display", "this device cannot time passes");
     }
     let mut renderer = renderer(&gpu(), support::builtin("cornell"), SIZE, "normals", &[]);
     let displayed = |renderer: &Renderer| {
