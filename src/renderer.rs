@@ -366,13 +366,13 @@ impl Renderer {
 
     /// Goes on to this frame's moment. Where time stands still, nothing has moved since the frame before.
     fn advance_time(&mut self) {
-        let before = self.moment;
         if self.frame_index == 0 {
             self.moment = 0;
-        } else if !self.accumulate {
+        }
+        let previous = self.moment;
+        if self.frame_index > 0 && !self.accumulate {
             self.moment = self.moment.wrapping_add(1);
         }
-        let previous = if self.frame_index == 0 { self.moment } else { before };
         let [previous, now] = [previous, self.moment].map(|moment| moment as f32 * FRAME_TIME);
         self.gpu_scene.animate(&self.gpu, &self.scene, previous, now);
     }
