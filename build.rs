@@ -37,14 +37,14 @@ fn main() {
             Ok((flattened, reflection)) => {
                 let id = file.trim_end_matches(".wgsl").trim_start_matches("techniques/").to_owned();
                 let flat_name = format!("{}.wgsl", id.replace('/', "."));
-                // The page downloads no comments; lines keep their numbers, so errors still map to their source.
+                // The page downloads no comments; lines keep their numbers, so a browser's words match target/shaders.
                 let text = if wasm { without_comments(&flattened.text) } else { flattened.text.clone() };
                 std::fs::write(out.join(&flat_name), text).expect("OUT_DIR is writable");
                 if let Some(copies) = &copies {
                     std::fs::write(copies.join(&flat_name), &flattened.text).expect("target folder is writable");
                 }
                 let name = id.replace(['/', '-'], "_").to_uppercase();
-                write_entry(&mut table, &name, &id, file, &flat_name, &flattened, &reflection);
+                write_entry(&mut table, &name, &id, file, &flat_name, &reflection);
                 names.push(name);
             }
             Err(error) => errors.push(error),
@@ -91,7 +91,6 @@ fn write_entry(
     id: &str,
     file: &str,
     flat_name: &str,
-    flattened: &shader_source::Flattened,
     reflection: &shader_source::Reflection,
 ) {
     let bindings = list(&reflection.bindings, |b| {
@@ -104,12 +103,11 @@ fn write_entry(
         let fields = list(&s.fields, |(name, offset)| format!("({name:?}, {offset})"));
         format!("StructLayout {{ name: {:?}, size: {}, fields: &[{fields}] }}", s.name, s.size)
     });
-    let segments = list(&flattened.segments, |s| format!("({}, {:?}, {})", s.line, s.file, s.file_line));
     writeln!(
         table,
         "/// `shaders/{file}`\npub static {name}: Shader = Shader {{\n    id: {id:?},\n    file: {file:?},\n    \
          source: include_str!(concat!(env!(\"OUT_DIR\"), \"/{flat_name}\")),\n    workgroup_size: {:?},\n    \
-         bindings: &[{bindings}],\n    overrides: &{:?},\n    structs: &[{structs}],\n    segments: &[{segments}],\n}};",
+         bindings: &[{bindings}],\n    overrides: &{:?},\n    structs: &[{structs}],\n}};",
         reflection.workgroup_size, reflection.overrides
     )
     .unwrap();

@@ -15,6 +15,8 @@ const cargoBin = join(process.env.CARGO_HOME ?? join(homedir(), '.cargo'), 'bin'
 /** The user's environment with this project's own tools first on PATH. */
 export const environment = {
   ...process.env,
+  // Wherever the user builds, the build, its cache and its tools are below target/, where the scripts look for them.
+  CARGO_TARGET_DIR: join(root, 'target'),
   PATH: [join(toolsFolder, 'bin'), join(root, 'node_modules', '.bin'), cargoBin, process.env.PATH].join(delimiter),
 };
 

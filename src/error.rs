@@ -54,14 +54,14 @@ pub enum Error {
     /// No WebGPU adapter was found, or the device could not be made.
     #[error("no usable graphics adapter: {0}")]
     NoAdapter(String),
-    /// The device is too small for what was asked.
-    #[error("{what} needs {wanted} {unit}, this device allows {had}")]
+    /// More than the device, or this program, allows.
+    #[error("{what}: {wanted} {unit} wanted, at most {had} allowed")]
     Limit {
         /// The resource.
         what: String,
         /// The number wanted.
         wanted: u64,
-        /// The number the device allows.
+        /// The number allowed.
         had: u64,
         /// The unit of both.
         unit: &'static str,

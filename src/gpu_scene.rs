@@ -95,23 +95,29 @@ impl GpuScene {
         })
     }
 
-    /// Moves the lights that move to where they are at `time` seconds, remembering where they were.
-    pub fn animate(&mut self, gpu: &Gpu, scene: &FlatScene, time: f32) {
+    /// Puts the lights that move where they are at `time` seconds, coming from where they were at `previous_time`.
+    pub fn animate(&mut self, gpu: &Gpu, scene: &FlatScene, previous_time: f32, time: f32) {
         if scene.motions.is_empty() {
             return;
-        }
-        for light in &mut self.punctual {
-            light.previous_position = light.position;
         }
         for motion in &scene.motions {
             let index = motion.light as usize;
             if let (Some(light), Some(rest)) = (self.punctual.get_mut(index), self.rest_positions.get(index)) {
-                let turn = Quat::from_axis_angle(motion.axis, motion.angular_speed * time);
-                light.position = motion.center + turn * (*rest - motion.center);
+                let at = |time: f32| {
+                    let turn = Quat::from_axis_angle(motion.axis, motion.angular_speed * time);
+                    motion.center + turn * (*rest - motion.center)
+                };
+                light.previous_position = at(previous_time);
+                light.position = at(time);
             }
         }
         let offset = u64::from(self.first_punctual) * std::mem::size_of::<Light>() as u64;
         gpu.queue.write_buffer(&self.lights, offset, bytemuck::cast_slice(&self.punctual));
+    }
+
+    /// The punctual lights as they are uploaded now, in the order of the scene.
+    pub fn punctual_lights(&self) -> &[Light] {
+        &self.punctual
     }
 
     /// Binds everything for the passes of a frame.

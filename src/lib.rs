@@ -3,6 +3,7 @@
 //! [`Scene`] -> [`FlatScene`] -> [`gpu_scene::GpuScene`] -> [`techniques::Technique`] -> [`film::Film`], and a
 //! [`Renderer`] that holds one of each.
 
+mod describe;
 pub mod error;
 pub mod film;
 pub mod frame;
@@ -17,6 +18,7 @@ pub mod techniques;
 #[cfg(target_arch = "wasm32")]
 mod web;
 
+pub use describe::describe;
 pub use error::{Error, Result};
 pub use gpu::{Gpu, GpuOptions};
 pub use output::Image;

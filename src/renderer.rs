@@ -58,14 +58,18 @@ pub struct Renderer {
     albedo_depth: wgpu::TextureView,
     normal: wgpu::TextureView,
     timer: Option<Timer>,
+    display_timer: Option<Timer>,
     render_params: RenderParams,
     film_params: FilmParams,
     camera: Camera,
+    /// The camera of the frame before, if its technique left a history.
     previous_camera: Option<Camera>,
     view: u32,
     seed: u32,
     accumulate: bool,
     frame_index: u32,
+    /// Scene time in steps of [`FRAME_TIME`]. It stands still while frames are accumulated.
+    moment: u32,
     accumulated: u32,
     restart_film: bool,
     /// One line for each shader whose last edit did not compile (debug builds).
@@ -93,6 +97,7 @@ impl Renderer {
             albedo_depth,
             normal,
             timer: Timer::new(&gpu),
+            display_timer: Timer::new(&gpu),
             render_params: RenderParams::default(),
             film_params: FilmParams::default(),
             camera,
@@ -101,6 +106,7 @@ impl Renderer {
             seed: 0,
             accumulate: scene.motions.is_empty(),
             frame_index: 0,
+            moment: 0,
             accumulated: 0,
             restart_film: true,
             shader_problems: Vec::new(),
@@ -119,6 +125,11 @@ impl Renderer {
     /// The scene.
     pub fn scene(&self) -> &FlatScene {
         &self.scene
+    }
+
+    /// The scene as it is on the device now.
+    pub fn gpu_scene(&self) -> &GpuScene {
+        &self.gpu_scene
     }
 
     /// The film.
@@ -152,20 +163,24 @@ impl Renderer {
     /// As [`Renderer::new`].
     pub fn set_scene(&mut self, scene: FlatScene) -> Result<()> {
         let camera = scene.cameras.first().cloned().ok_or_else(|| Error::bad_value("scene", "has no camera"))?;
-        self.gpu_scene = GpuScene::new(&self.gpu, &scene)?;
+        let gpu_scene = GpuScene::new(&self.gpu, &scene)?;
+        self.gpu.check()?;
+        self.gpu_scene = gpu_scene;
         self.accumulate = scene.motions.is_empty();
         self.scene = scene;
         self.camera = camera;
         self.reset();
-        self.gpu.check()
+        Ok(())
     }
 
-    /// Switches to another technique, with its default parameters.
+    /// Switches to another technique, with its default parameters. On error the old technique stays.
     ///
     /// # Errors
-    /// `UNKNOWN_NAME` listing the ids there are.
+    /// `UNKNOWN_NAME` listing the ids there are; `LIMIT` if its buffers do not fit.
     pub fn set_technique(&mut self, id: &str) -> Result<()> {
-        self.technique = (techniques::find(id)?.create)(&self.gpu);
+        let mut technique = (techniques::find(id)?.create)(&self.gpu);
+        technique.prepare(&self.gpu, self.size())?;
+        self.technique = technique;
         if (1..FIRST_COMMON_VIEW).contains(&self.view) {
             self.view = 0;
         }
@@ -173,10 +188,12 @@ impl Renderer {
         Ok(())
     }
 
-    /// Sets a parameter: of the technique by its name, or of a global group as `render.NAME` or `film.NAME`.
+    /// Sets a parameter: of the technique by its name, or of a global group as `render.NAME` or `film.NAME`. On error the
+    /// old value stays.
     ///
     /// # Errors
-    /// `UNKNOWN_NAME` listing the names there are; `BAD_VALUE` saying what the parameter takes.
+    /// `UNKNOWN_NAME` listing the names there are; `BAD_VALUE` saying what the parameter takes; `LIMIT` if what the
+    /// technique needs with it does not fit.
     pub fn set(&mut self, key: &str, value: &str) -> Result<()> {
         let known = match key.split_once('.') {
             Some(("film", name)) => {
@@ -187,7 +204,7 @@ impl Renderer {
                 false
             }
             Some(("render", name)) => self.render_params.set(name, value)?,
-            _ => self.technique.set(key, value)?,
+            _ => self.set_of_technique(key, value)?,
         };
         if known {
             self.reset();
@@ -201,6 +218,21 @@ impl Renderer {
             name: key.to_owned(),
             known: own.chain(render).chain(film).collect::<Vec<_>>().join(", "),
         })
+    }
+
+    /// Sets a parameter of the technique, or leaves it where the device has no room for what it needs then. Whether the
+    /// name was known.
+    fn set_of_technique(&mut self, name: &str, value: &str) -> Result<bool> {
+        let before = self.technique.values();
+        let known = self.technique.set(name, value)?;
+        if known && let Err(error) = self.technique.prepare(&self.gpu, self.size()) {
+            if let Some(old) = before.get(name) {
+                self.technique.set(name, &old.as_str().map_or_else(|| old.to_string(), str::to_owned))?;
+                self.technique.prepare(&self.gpu, self.size())?;
+            }
+            return Err(error);
+        }
+        Ok(known)
     }
 
     /// All parameter values: `{"technique": {...}, "render": {...}, "film": {...}}`.
@@ -248,13 +280,13 @@ impl Renderer {
         self.reset();
     }
 
-    /// Whether frames are averaged. On, time stands still; off, each frame is shown alone and lights move.
+    /// Whether frames are averaged. On, time stands still where it is; off, each frame is shown alone and lights move.
     pub fn set_accumulate(&mut self, accumulate: bool) {
         self.accumulate = accumulate;
         self.restart_film = true;
     }
 
-    /// Starts again: frame 0, no history, an empty film.
+    /// Starts again: frame 0, time 0, no history, an empty film.
     pub fn reset(&mut self) {
         self.frame_index = 0;
         self.previous_camera = None;
@@ -293,17 +325,15 @@ impl Renderer {
             self.technique.prepare(&self.gpu, size)?;
             self.technique_ready = true;
         }
-        if self.frame_index == 0 {
-            self.gpu_scene.animate(&self.gpu, &self.scene, 0.0);
-        }
-        if !self.accumulate {
-            self.gpu_scene.animate(&self.gpu, &self.scene, self.frame_index as f32 * FRAME_TIME);
-        }
+        self.advance_time();
         self.gpu.queue.write_buffer(&self.frame_uniform, 0, bytemuck::bytes_of(&self.frame()));
         self.film.prepare(&self.gpu, &self.film_params, self.view != 0);
 
         let restart = self.restart_film || !self.accumulate;
         let parity = (self.frame_index & 1) as usize;
+        if let Some(timer) = &mut self.display_timer {
+            timer.clear();
+        }
         let mut recorder = Recorder::new(&self.gpu, self.timer.as_mut());
         // Rays are counted by the frame, what was left out since the film began.
         recorder.encoder.clear_buffer(&self.film.counters, 0, if restart { None } else { Some(4) });
@@ -328,9 +358,23 @@ impl Renderer {
 
         self.accumulated = if restart { 1 } else { self.accumulated + 1 };
         self.restart_film = false;
-        self.previous_camera = Some(self.camera.clone());
+        // The common views run no technique, and leave its history as old as it was.
+        self.previous_camera = (self.view < FIRST_COMMON_VIEW).then(|| self.camera.clone());
         self.frame_index = self.frame_index.wrapping_add(1);
         self.gpu.check()
+    }
+
+    /// Goes on to this frame's moment. Where time stands still, nothing has moved since the frame before.
+    fn advance_time(&mut self) {
+        if self.frame_index == 0 {
+            self.moment = 0;
+        }
+        let previous = self.moment;
+        if self.frame_index > 0 && !self.accumulate {
+            self.moment = self.moment.wrapping_add(1);
+        }
+        let [previous, now] = [previous, self.moment].map(|moment| moment as f32 * FRAME_TIME);
+        self.gpu_scene.animate(&self.gpu, &self.scene, previous, now);
     }
 
     /// Brings the display buffer up to date with the film.
@@ -339,7 +383,7 @@ impl Renderer {
     /// `DEVICE` for an error the device has reported.
     pub fn render_display(&mut self) -> Result<()> {
         self.film.prepare(&self.gpu, &self.film_params, self.view != 0);
-        let mut recorder = Recorder::new(&self.gpu, None);
+        let mut recorder = Recorder::new(&self.gpu, self.display_timer.as_mut());
         recorder.share("film", self.film.uniforms());
         self.film.record_display(&mut recorder, &self.film_params)?;
         recorder.submit();
@@ -365,7 +409,7 @@ impl Renderer {
             environment_light: environment_light(&self.scene),
             view: self.view,
             scene_radius: 0.5 * (high - low).length(),
-            history: (self.frame_index > 0).into(),
+            history: self.previous_camera.is_some().into(),
             pixel_filter: self.render_params.pixel_filter,
             padding: 0,
         }
@@ -450,17 +494,19 @@ impl Renderer {
         }
     }
 
-    /// GPU time of each pass of the last frame; empty where the device cannot time.
+    /// GPU time of each pass of the last frame, those of its display included if it was displayed; empty where the
+    /// device cannot time.
     ///
     /// # Errors
     /// `DEVICE` if they cannot be read back.
     pub fn pass_times(&self) -> impl Future<Output = Result<Vec<PassTime>>> + use<> {
-        let (gpu, timer) = (self.gpu.clone(), self.timer.clone());
+        let (gpu, timers) = (self.gpu.clone(), [self.timer.clone(), self.display_timer.clone()]);
         async move {
-            match &timer {
-                Some(timer) => timer.read(&gpu).await,
-                None => Ok(Vec::new()),
+            let mut times = Vec::new();
+            for timer in timers.iter().flatten() {
+                times.extend(timer.read(&gpu).await?);
             }
+            Ok(times)
         }
     }
 }

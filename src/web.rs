@@ -3,7 +3,6 @@
 
 use crate::film::blit::Blit;
 use crate::gpu::{Gpu, GpuOptions, instance};
-use crate::params::{FilmParams, ParamSpec, Params, RenderParams};
 use crate::scene::{Camera, Projection, builtin, gltf};
 use crate::{Error, FlatScene, Renderer, Scene};
 use glam::{UVec2, Vec3};
@@ -35,20 +34,10 @@ impl<T> OrJs<T> for crate::Result<T> {
     }
 }
 
-/// The registry as JSON: version, techniques, film and render parameters, built-in scenes.
+/// The registry as JSON: what [`crate::describe`] gives.
 #[wasm_bindgen]
 pub fn describe() -> String {
-    let specs = |specs: &[ParamSpec]| specs.iter().map(ParamSpec::describe).collect::<serde_json::Value>();
-    serde_json::json!({
-        "version": env!("CARGO_PKG_VERSION"),
-        "techniques": crate::techniques::describe_json(),
-        "film": { "params": specs(FilmParams::SPECS) },
-        "render": { "params": specs(RenderParams::SPECS) },
-        "scenes": builtin::ALL.iter().map(|s| serde_json::json!({
-            "name": s.name, "title": s.title, "doc": s.doc, "example": s.example,
-        })).collect::<serde_json::Value>(),
-    })
-    .to_string()
+    crate::describe().to_string()
 }
 
 fn flatten(mut scene: Scene, lights: u32, seed: u32, progress: &js_sys::Function) -> JsResult<Vec<u8>> {
@@ -255,7 +244,7 @@ fn camera_from_json(json: &str) -> crate::Result<Camera> {
     };
     let unit = |key: &str| vector(key)?.try_normalize().ok_or_else(|| bad(&format!("{key} has no direction")));
     let projection = match (number(&value["vertical_fov"]), number(&value["half_height"])) {
-        (Some(vertical_fov), _) if vertical_fov > 0.0 && vertical_fov < 3.14 => {
+        (Some(vertical_fov), _) if vertical_fov > 0.0 && vertical_fov < std::f32::consts::PI => {
             Projection::Perspective { vertical_fov }
         }
         (_, Some(half_height)) if half_height > 0.0 => Projection::Orthographic { half_height },

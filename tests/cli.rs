@@ -228,6 +228,20 @@ fn compare_refuses_what_it_cannot_compare() {
     fail(&["compare", &a, &nan], 1, "BAD_VALUE", "576 NaN");
     fail(&["compare", &a, &text], 1, "BAD_FILE", "text.exr");
     fail(&["compare", &a, &folder.path("missing.exr")], 1, "IO", "missing.exr");
+    // A device may never end, so only regular files are read.
+    fail(&["compare", &a, "/dev/zero"], 1, "IO", "not a regular file");
+}
+
+#[test]
+fn clamped_environments_are_warned_of() {
+    let folder = Folder::new("clamped");
+    let (sky, out) = (exr(&folder, "sky.exr", 4, 2, f32::NAN), folder.path("a.png"));
+    let args = ["render", "builtin:cornell", "--environment", &sky, "--size", "16x8", "--frames", "1", "--out", &out];
+    let output = restir(&args);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(stderr(&output).contains("24 values were not within 0 and 1e8"), "{}", stderr(&output));
+    let report = succeed_json(&[&args[..], &["--json"]].concat());
+    assert!(report["warnings"][0].as_str().unwrap().contains("24 values"), "{report}");
 }
 
 #[test]
@@ -242,7 +256,14 @@ fn scenes_and_techniques_are_listed() {
 
     let listed = succeed_json(&["techniques", "--json"]);
     let text = succeed(&["techniques"]);
-    let techniques = listed.as_array().unwrap();
+    let techniques = listed["techniques"].as_array().unwrap();
+    assert_eq!(listed["version"], env!("CARGO_PKG_VERSION"));
+    assert_eq!(listed["scenes"], scenes);
+    for (group, name) in [("render", "max_depth"), ("film", "exposure")] {
+        let params = listed[group]["params"].as_array().unwrap();
+        assert!(params.iter().any(|parameter| parameter["name"] == name), "{name} in {listed}");
+        assert!(text.contains(&format!("{group}.{name}")), "{group}.{name} in {text}");
+    }
     for id in ["normals", "path-tracer", "restir-di", "ris"] {
         let info = techniques.iter().find(|t| t["id"] == id).unwrap_or_else(|| panic!("{id} in {listed}"));
         assert!(info["title"].is_string() && info["summary"].is_string() && info["bias"].is_string(), "{info}");

@@ -401,3 +401,14 @@ fn planted_faults_are_found() {
         }
     }
 }
+
+#[test]
+fn progress_is_told_in_order_and_not_too_often() {
+    let mut scene = builtin::make("cornell").expect("a built-in scene");
+    let instance = scene.instances[0];
+    scene.instances.extend(vec![instance; 5000]);
+    let mut told = Vec::new();
+    FlatScene::build(&scene, &mut |fraction, _| told.push(fraction)).expect("a sound scene");
+    assert!((50..=110).contains(&told.len()), "{}", told.len());
+    assert!(told.is_sorted() && told.last() == Some(&1.0), "{told:?}");
+}

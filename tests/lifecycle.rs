@@ -326,3 +326,93 @@ fn cameras_move_through_everything() {
         }
     }
 }
+
+/// Where the first moving light is now, and where it was in the frame before.
+fn moving_light(renderer: &Renderer) -> [Vec3; 2] {
+    let light = renderer.gpu_scene().punctual_lights()[renderer.scene().motions[0].light as usize];
+    [light.position, light.previous_position]
+}
+
+#[test]
+fn lights_move_on_from_where_they_stood_still() {
+    let mut renderer = renderer(&gpu(), support::builtin("cornell-64"), SIZE, "normals", &[]);
+    render(&mut renderer, 1);
+    let [start, before] = moving_light(&renderer);
+    assert_eq!(start, before, "nothing is before the first frame");
+    render(&mut renderer, 2);
+    let [moved, before] = moving_light(&renderer);
+    assert!(moved != before && before != start, "time goes on");
+
+    renderer.set_accumulate(true);
+    for frame in 0..2 {
+        render(&mut renderer, 1);
+        assert_eq!(moving_light(&renderer), [moved, moved], "time stands still, frame {frame}");
+    }
+    renderer.set_accumulate(false);
+    render(&mut renderer, 1);
+    let [further, before] = moving_light(&renderer);
+    assert!(further != moved && before == moved, "time goes on from where it stood");
+
+    renderer.reset();
+    render(&mut renderer, 1);
+    assert_eq!(moving_light(&renderer), [start, start], "reset is the beginning");
+}
+
+#[test]
+fn history_is_not_used_across_a_common_view() {
+    let last_of_four = |temporal: &str, view_between: &str| {
+        let settings = [("temporal_reuse", temporal)];
+        let mut renderer = renderer(&gpu(), support::builtin("cornell"), SIZE, "restir-di", &settings);
+        renderer.set_accumulate(false);
+        render(&mut renderer, 2);
+        renderer.set_view(view_between).expect("a view");
+        render(&mut renderer, 1);
+        renderer.set_view("radiance").expect("a view");
+        render(&mut renderer, 1)
+    };
+    let without = last_of_four("false", "radiance");
+    assert!(last_of_four("true", "radiance") != without, "history is used");
+    assert!(last_of_four("true", "direct") != without, "history is used across the technique's own views");
+    assert_same(&last_of_four("true", "albedo"), &without, "after the albedo");
+}
+
+#[test]
+fn what_does_not_fit_leaves_what_there_was() {
+    let mut renderer = renderer(&gpu(), support::builtin("cornell"), SIZE, "restir-di", &[("light_samples", "2")]);
+    let before = render_clean(&mut renderer, 2, "before");
+    let settings = renderer.parameters();
+
+    // The film would do, four reservoirs a pixel would not.
+    renderer.resize([1920, 1100].into()).expect("a size");
+    assert!(matches!(renderer.set("reservoir_size", "4"), Err(Error::Limit { .. })));
+    assert_eq!(renderer.parameters(), settings);
+    renderer.resize(SIZE.into()).expect("a size");
+    assert_same(&render_clean(&mut renderer, 2, "after a setting"), &before, "after a setting");
+
+    let mut large = support::builtin("cornell-64");
+    large.atlas.size = 1 << 20;
+    assert!(matches!(renderer.set_scene(large), Err(Error::Limit { .. })));
+    assert_eq!(renderer.scene().name, "cornell");
+    renderer.reset();
+    assert_same(&render_clean(&mut renderer, 2, "after a scene"), &before, "after a scene");
+}
+
+#[test]
+fn pass_times_include_the_display() {
+    if !gpu().has_timestamps {
+        return skip("pass_times_include_the_display", "this device cannot time passes");
+    }
+    let mut renderer = renderer(&gpu(), support::builtin("cornell"), SIZE, "normals", &[]);
+    let displayed = |renderer: &Renderer| {
+        let times = pollster::block_on(renderer.pass_times()).expect("pass times");
+        times.iter().filter(|time| time.name == "film/display").count()
+    };
+    render(&mut renderer, 1);
+    assert_eq!(displayed(&renderer), 0);
+    for _ in 0..2 {
+        renderer.render_display().expect("a display");
+    }
+    assert_eq!(displayed(&renderer), 1);
+    render(&mut renderer, 1);
+    assert_eq!(displayed(&renderer), 0, "the display was of the frame before");
+}

@@ -4,11 +4,12 @@
 mod support;
 
 use glam::UVec2;
-use restir::Error;
 use restir::gpu::recorder::Recorder;
 use restir::gpu::shader::{SceneFeatures, table};
 use restir::gpu::shader_source::{flatten, reflect};
-use std::collections::BTreeSet;
+use restir::params::{FilmParams, ParamKind, Params, RenderParams};
+use restir::{Error, techniques};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 use support::*;
@@ -175,6 +176,43 @@ fn every_pass_opens_with_what_it_does() {
         // A render pass writes to its target and nothing else.
         let what = (header.contains("reads") && writes) || shader.workgroup_size[0] == 0;
         assert!(what || header.contains("source"), "{}: what does it read and write?", shader.file);
+    }
+}
+
+/// The numbers of all `const {prefix}NAME = 0u;` lines of the shaders (test kernels number their operations), by NAME.
+fn enumeration(prefix: &str) -> BTreeMap<String, usize> {
+    let root = source_root().join("shaders");
+    let mut found = BTreeMap::new();
+    for file in files_below(&root, "wgsl").iter().filter(|file| !file.starts_with("tests/")) {
+        let text = std::fs::read_to_string(root.join(file)).expect("readable");
+        for line in text.lines().filter_map(|line| line.strip_prefix("const ")?.strip_prefix(prefix)) {
+            let number = line.split_once(';').and_then(|(constant, _)| constant.split_once(" = "));
+            let (name, number) = number.unwrap_or_else(|| panic!("{file}: const {prefix}{line}"));
+            let number = number.strip_suffix('u').and_then(|n| n.parse().ok());
+            let number = number.unwrap_or_else(|| panic!("{file}: const {prefix}{line}"));
+            assert_eq!(found.insert(name.to_owned(), number), None, "{prefix}{name} twice");
+        }
+    }
+    found
+}
+
+/// A uniform holds the index of a choice, so shaders must count choices as they are declared.
+#[test]
+fn shaders_number_choices_as_declared() {
+    let restir_di = techniques::find("restir-di").expect("a technique").params;
+    let choices = [
+        ("BIAS_CORRECTION_", restir_di, "bias_correction"),
+        ("TONE_MAP_", FilmParams::SPECS, "tone_map"),
+        ("MIS_", RenderParams::SPECS, "mis_heuristic"),
+        ("PIXEL_FILTER_", RenderParams::SPECS, "pixel_filter"),
+    ];
+    for (prefix, specs, name) in choices {
+        let spec = specs.iter().find(|spec| spec.name == name).unwrap_or_else(|| panic!("no parameter {name}"));
+        let ParamKind::Choice(names) = spec.kind else { panic!("{name} is no choice") };
+        // A slash or a digit has no place in the name of a constant: 1/z is Z.
+        let constant = |name: &str| name.trim_start_matches("1/").replace('-', "_").to_uppercase();
+        let declared: BTreeMap<_, _> = names.iter().enumerate().map(|(i, name)| (constant(name), i)).collect();
+        assert_eq!(enumeration(prefix), declared, "{prefix}* and the choices of {name}");
     }
 }
 

@@ -33,13 +33,13 @@ pub struct FilmUniforms {
 }
 
 gpu_struct! {
-/// What passes count during one frame.
+/// What passes count: rays of one frame, and what was left out of the film since it began.
 pub struct Counters {
-    /// Rays traced.
+    /// Rays traced in the frame.
     pub rays: u32,
-    /// Pixels whose radiance was not a number.
+    /// Pixel samples that were not numbers, since the film began.
     pub nan: u32,
-    /// Pixels whose radiance was infinite.
+    /// Pixel samples that were infinite, since the film began.
     pub infinite: u32,
     /// Unused.
     pub padding: u32,
@@ -58,7 +58,7 @@ pub struct Film {
     exposure_state: wgpu::Buffer,
     /// Tone-mapped sRGB RGBA8, one `u32` a pixel.
     pub display: wgpu::Buffer,
-    /// [`Counters`] of the frame being recorded, then of the last one.
+    /// [`Counters`] up to the frame being recorded, then up to the last one.
     pub counters: wgpu::Buffer,
 }
 

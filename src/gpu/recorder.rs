@@ -44,6 +44,11 @@ impl Timer {
         })
     }
 
+    /// Forgets what was timed.
+    pub fn clear(&mut self) {
+        self.names.clear();
+    }
+
     /// Times of the last recorded frame.
     ///
     /// # Errors
@@ -79,7 +84,7 @@ impl<'a> Recorder<'a> {
     /// Starts a frame.
     pub fn new(gpu: &'a Gpu, mut timer: Option<&'a mut Timer>) -> Self {
         if let Some(timer) = timer.as_mut() {
-            timer.names.clear();
+            timer.clear();
         }
         let encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
         Recorder { gpu, encoder, timer, shared: Vec::new(), features: SceneFeatures::ALL }

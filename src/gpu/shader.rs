@@ -45,8 +45,6 @@ pub struct Shader {
     pub overrides: &'static [&'static str],
     /// Every struct with a layout.
     pub structs: &'static [StructLayout],
-    /// (first flattened line, file, line in file), sorted.
-    pub segments: &'static [(u32, &'static str, u32)],
 }
 
 /// The generated table.

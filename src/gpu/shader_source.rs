@@ -33,15 +33,10 @@ pub struct Flattened {
 impl Flattened {
     /// `file:line` of a line of the flattened text.
     pub fn place(&self, line: u32) -> String {
-        place(self.segments.iter().map(|s| (s.line, s.file.as_str(), s.file_line)), line)
-    }
-}
-
-/// `file:line` of a line of flattened text, from (first line, file, line in file) runs sorted by line.
-pub fn place<'a>(segments: impl Iterator<Item = (u32, &'a str, u32)>, line: u32) -> String {
-    match segments.take_while(|(first, ..)| *first <= line).last() {
-        Some((first, file, file_line)) => format!("{file}:{}", file_line + line - first),
-        None => format!("line {line}"),
+        match self.segments.iter().take_while(|segment| segment.line <= line).last() {
+            Some(segment) => format!("{}:{}", segment.file, segment.file_line + line - segment.line),
+            None => format!("line {line}"),
+        }
     }
 }
 

@@ -20,7 +20,7 @@ pub struct ExrPicture<'a> {
     pub albedo: Option<&'a [[f32; 3]]>,
     /// World-space unit shading normal of the first surface: channels `normal.X`, `normal.Y`, `normal.Z`.
     pub normal: Option<&'a [[f32; 3]]>,
-    /// Distance to the first surface in metres: channel `depth.Z`.
+    /// Distance to the first surface along the view axis in metres: channel `depth.Z`.
     pub depth: Option<&'a [f32]>,
     /// Technique id: attribute `restir.technique`.
     pub technique: &'a str,
@@ -152,15 +152,17 @@ const COMPRESSIONS: [Compression; 6] = [
     Compression::PXR24,
 ];
 
+/// Most bytes of a file that [`read_exr`] reads.
+#[cfg(not(target_arch = "wasm32"))]
+const MAX_FILE_BYTES: u64 = 4 << 30;
+
 /// [`decode_exr`] of a file.
 ///
 /// # Errors
-/// [`Error::Io`]; otherwise as [`decode_exr`].
+/// [`Error::Io`] where it cannot be read or is no regular file, [`Error::Limit`] where it is larger than 4 GiB; otherwise as [`decode_exr`].
 #[cfg(not(target_arch = "wasm32"))]
 pub fn read_exr(path: &std::path::Path) -> Result<Image> {
-    let name = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|source| Error::Io { path: name.clone(), source })?;
-    decode_exr(&name, &bytes)
+    decode_exr(&path.display().to_string(), &crate::scene::files::read(path, MAX_FILE_BYTES)?)
 }
 
 /// Reads the colour of an EXR file: channels `R`, `G`, `B`, or `Y` for grey, in 16- or 32-bit float, in any order, from

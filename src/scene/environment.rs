@@ -11,13 +11,13 @@ pub const MAX_TEXELS: usize = 8192 * 4096;
 /// Radiance above this, and infinity, become this: sums over a whole map then stay finite in f32.
 pub const MAX_RADIANCE: f32 = 1.0e8;
 
-/// Loads an environment map from a file; see [`decode`].
+/// Loads an environment map from a file; see [`decode_counting`].
 ///
 /// # Errors
 /// [`Error::Io`] where it cannot be read, else as [`decode`].
 #[cfg(not(target_arch = "wasm32"))]
-pub fn load_file(path: &std::path::Path) -> Result<Environment> {
-    decode(&path.display().to_string(), &super::files::read(path, 2 << 30)?)
+pub fn load_file(path: &std::path::Path) -> Result<(Environment, u64)> {
+    decode_counting(&path.display().to_string(), &super::files::read(path, 2 << 30)?)
 }
 
 /// Decodes an OpenEXR file (see [`decode_exr`](crate::output::decode_exr)) or a Radiance one (RGBE, rows from the top),

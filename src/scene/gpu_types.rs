@@ -1,6 +1,6 @@
 //! The structs that shaders read, each with a WGSL twin of the same name whose layout a test compares.
 //!
-//! `gpu_struct!` registers a struct's size and field offsets in its `LAYOUT`; [`LAYOUTS`] lists them all.
+//! `gpu_struct!` registers a struct's size and field offsets in its `LAYOUT`; [`crate::gpu_layouts`] lists them all.
 
 use glam::{Mat4, Vec3, Vec4};
 
@@ -200,7 +200,7 @@ pub type EnvironmentTexel = [u32; 4];
 gpu_struct! {
 /// A camera as the shaders need it: 128 bytes.
 pub struct CameraView {
-    /// World to clip (z is reverse-free: only x, y, w are used), for reprojection.
+    /// World to clip, for reprojection: x, y and w, for z is not used.
     pub world_to_clip: Mat4,
     /// Eye (perspective) or centre of the image plane (orthographic).
     pub position: Vec3,

@@ -1,11 +1,14 @@
 //! Giving light to a scene that has none.
 
+use super::flat::face_normal;
 use super::random::Random;
 use super::{Environment, PunctualKind, PunctualLight, Scene};
 use glam::Vec3;
 
 /// More scattered lights than this are not made.
 const MAX_SCATTERED: u32 = 1_000_000;
+/// A scene smaller than this counts as a point, in metres: the light of its square would be lost in rounding.
+const MIN_EXTENT: f32 = 1e-6;
 const SEED: u64 = 0x6c69_6768;
 
 impl Scene {
@@ -38,8 +41,19 @@ impl Scene {
 
     fn has_light(&self) -> bool {
         let emits = |instance: &super::Instance| {
-            let mesh = self.meshes.get(instance.mesh as usize).filter(|mesh| mesh.indices.len() >= 3);
-            mesh.and_then(|mesh| self.materials.get(mesh.material as usize)).is_some_and(|m| m.emissive != Vec3::ZERO)
+            let Some(mesh) = self.meshes.get(instance.mesh as usize) else { return false };
+            let material = self.materials.get(mesh.material as usize);
+            let placed = |&corner: &u32| {
+                mesh.positions.get(corner as usize).map_or(Vec3::NAN, |p| instance.transform.transform_point3(*p))
+            };
+            // As flattening leaves it out, a triangle without area does not shine.
+            material.is_some_and(|material| material.emissive != Vec3::ZERO)
+                && mesh
+                    .indices
+                    .as_chunks()
+                    .0
+                    .iter()
+                    .any(|corners| face_normal(corners.each_ref().map(placed)).is_some())
         };
         let bright = |environment: &Environment| environment.pixels.iter().flatten().any(|&c| c > 0.0);
         self.lights.iter().any(|light| light.intensity != Vec3::ZERO)
@@ -47,7 +61,7 @@ impl Scene {
             || self.instances.iter().any(emits)
     }
 
-    /// The box of all placed vertices, or a box of a metre if there are none.
+    /// The box of all placed vertices, or one of a metre if there are none or all are at one point.
     fn corners(&self) -> [Vec3; 2] {
         let mut corners = [Vec3::INFINITY, Vec3::NEG_INFINITY];
         for instance in &self.instances {
@@ -57,7 +71,12 @@ impl Scene {
                 corners = [corners[0].min(p), corners[1].max(p)];
             }
         }
-        if corners[0].is_finite() { corners } else { [Vec3::splat(-0.5), Vec3::splat(0.5)] }
+        let extent = (corners[1] - corners[0]).max_element();
+        match (corners[0].is_finite(), extent < MIN_EXTENT) {
+            (true, false) => corners,
+            (true, true) => [corners[0] - 0.5, corners[1] + 0.5],
+            (false, _) => [Vec3::splat(-0.5), Vec3::splat(0.5)],
+        }
     }
 }
 
@@ -96,6 +115,27 @@ mod tests {
         assert!(hundred.iter().all(|l| l.position.x.abs() <= 0.5 && (0.0..=1.0).contains(&l.position.y)));
         let total = |lights: &[PunctualLight]| lights.iter().map(|l| l.intensity.y).sum::<f32>();
         assert!((total(&lights(1000, 1)) / total(&hundred) - 1.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn a_scene_at_one_point_is_lit_too() {
+        let mut scene = dark();
+        for instance in &mut scene.instances {
+            instance.transform = glam::Mat4::from_scale(Vec3::ZERO);
+        }
+        scene.ensure_light(3, 0);
+        assert_eq!(scene.lights.len(), 3);
+        assert!(scene.lights.iter().all(|light| light.intensity.min_element() > 1e-3));
+    }
+
+    #[test]
+    fn emission_without_area_is_no_light() {
+        let mut scene = builtin::make("cornell").unwrap();
+        for mesh in &mut scene.meshes {
+            mesh.indices.iter_mut().for_each(|index| *index = 0);
+        }
+        scene.ensure_light(0, 0);
+        assert!(scene.environment.is_some());
     }
 
     #[test]

@@ -7,6 +7,8 @@ pub mod statistics;
 pub mod twins;
 
 use restir::{FlatScene, Gpu, GpuOptions, Image, Renderer, Scene};
+use std::io::Write;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 /// The test binary's device, within WebGPU's default limits: what passes here runs everywhere.
@@ -21,15 +23,30 @@ pub fn fresh_gpu() -> Gpu {
         .expect("a Vulkan driver (Debian: mesa-vulkan-drivers)")
 }
 
+/// Says that a test does not run, and why. Aloud: what `eprintln!` prints is only shown of tests that fail.
+pub fn skip(test: &str, why: &str) {
+    let _ = writeln!(std::io::stderr(), "skipped {test}: {why}");
+}
+
+/// A file of the folder `shared` beside the repository, or nothing and a word about it: such files are too large to
+/// belong to the repository.
+pub fn shared_file(test: &str, name: &str) -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(name);
+    if path.exists() {
+        return Some(path);
+    }
+    skip(test, &format!("it wants the file shared/{name} in the folder that holds the repository"));
+    None
+}
+
 /// Flattens a scene.
 pub fn flatten(scene: &Scene) -> FlatScene {
     FlatScene::build(scene, &mut |_, _| ()).expect("the scene flattens")
 }
 
-/// A built-in scene, flattened, with a light if it has none.
+/// A built-in scene, flattened.
 pub fn builtin(name: &str) -> FlatScene {
     let scene = restir::scene::builtin::make(name).expect("a built-in scene");
-
     flatten(&scene)
 }
 

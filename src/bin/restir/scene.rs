@@ -33,7 +33,12 @@ pub fn load(name: &str) -> Result<Scene> {
 /// Adds the environment given, or, where there is no light at all, scattered lights or a sky.
 pub fn light(scene: &mut Scene, lighting: &Lighting, seed: u32) -> Result<()> {
     if let Some(file) = &lighting.environment {
-        scene.environment = Some(environment::load_file(file)?);
+        let (environment, clamped) = environment::load_file(file)?;
+        scene.environment = Some(environment);
+        if clamped > 0 {
+            let (file, most) = (file.display(), environment::MAX_RADIANCE);
+            scene.warnings.push(format!("{file}: {clamped} values were not within 0 and {most:e} and were clamped"));
+        }
     }
     scene.ensure_light(lighting.lights.unwrap_or(0), seed.into());
     Ok(())

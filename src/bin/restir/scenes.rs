@@ -14,12 +14,7 @@ pub struct Args {
 
 pub fn run(args: &Args) -> Result<()> {
     if args.json {
-        let scenes = builtin::ALL.iter().map(|scene| {
-            serde_json::json!({
-                "name": scene.name, "example": scene.example, "title": scene.title, "doc": scene.doc,
-            })
-        });
-        return report::json(&scenes.collect::<Vec<_>>());
+        return report::json(&builtin::describe_json());
     }
     let lines = builtin::ALL.iter().map(|scene| format!("builtin:{:20} {}. {}", scene.example, scene.title, scene.doc));
     report::text(&lines.collect::<Vec<_>>().join("\n"))

@@ -8,14 +8,14 @@ use restir::techniques::{self, TechniqueInfo};
 /// List the techniques with their papers, bias, parameters and views.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Print JSON.
+    /// Print JSON: techniques, the parameters of all of them (render, film), the built-in scenes, the version.
     #[arg(long)]
     json: bool,
 }
 
 pub fn run(args: &Args) -> Result<()> {
     if args.json {
-        return report::json(&techniques::describe_json());
+        return report::json(&restir::describe());
     }
     let mut sections: Vec<String> = techniques::ALL.iter().map(|info| describe(info)).collect();
     for (group, specs) in [("render", RenderParams::SPECS), ("film", FilmParams::SPECS)] {

@@ -85,6 +85,17 @@ pub fn make(name: &str) -> Result<Scene> {
     }
 }
 
+/// The list as JSON: name, title, doc, example.
+pub fn describe_json() -> serde_json::Value {
+    ALL.iter()
+        .map(|scene| {
+            serde_json::json!({
+                "name": scene.name, "title": scene.title, "doc": scene.doc, "example": scene.example,
+            })
+        })
+        .collect()
+}
+
 /// A rough dielectric.
 fn matte(name: &str, color: Vec3) -> Material {
     Material { name: name.to_owned(), base_color: color.extend(1.0), metallic: 0.0, ..Material::default() }

@@ -7,6 +7,8 @@ mod materials;
 mod triangles;
 mod validate;
 
+pub(super) use triangles::face_normal;
+
 use super::gpu_types::{BvhNode, EnvironmentTexel, Light, Material, NONE, Triangle};
 use super::{Camera, LightMotion, MAX_COORDINATE, Projection, PunctualKind, Scene, bvh};
 use crate::error::{Error, Result};

@@ -4,13 +4,14 @@ use crate::error::{Error, Result};
 use crate::scene::gpu_types::{
     NONE, TRIANGLE_ALPHA_MASK, TRIANGLE_BITANGENT_SHIFT, TRIANGLE_DOUBLE_SIDED, TRIANGLE_TANGENTS, Triangle,
 };
-use crate::scene::{AlphaMode, Instance, MAX_COORDINATE, Mesh, Scene, octahedral};
+use crate::scene::{AlphaMode, Instance, MAX_COORDINATE, MAX_TRIANGLES, Mesh, Scene, octahedral};
 use glam::{Mat3, Vec2, Vec3, Vec4};
 
-/// Most triangles after instancing: 2 GiB of them, or 512 MiB where addresses are short.
-const MAX_TRIANGLES: u64 = if cfg!(target_pointer_width = "32") { 1 << 22 } else { 1 << 24 };
 /// Twice the area below which a triangle has none, in square metres: its square would be denormal.
 const MIN_TWICE_AREA: f32 = 1e-18;
+
+/// How often progress is told at most.
+const MAX_REPORTS: usize = 100;
 
 /// What baking found.
 pub(super) struct Baked {
@@ -38,9 +39,12 @@ pub(super) fn bake(scene: &Scene, progress: &mut dyn FnMut(f32, &str)) -> Result
         check(mesh, scene.materials.len()).map_err(|what| Error::bad_value(format!("mesh {i}"), what))?;
     }
     let mut baked = Baked { triangles: Vec::with_capacity(total as usize), dropped: 0 };
-    let instance_count = scene.instances.len().max(1) as f32;
+    let count = scene.instances.len();
     for (i, instance) in scene.instances.iter().enumerate() {
-        progress(i as f32 / instance_count, "placing meshes");
+        // Each report may cross a thread.
+        if i.is_multiple_of(count.div_ceil(MAX_REPORTS)) {
+            progress(i as f32 / count as f32, "placing meshes");
+        }
         let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
         let flags = scene.materials.get(mesh.material as usize).map_or(0, |material| {
             let masked = matches!(material.alpha, AlphaMode::Mask(_));
@@ -113,12 +117,7 @@ impl<'a> Placed<'a> {
             corners.swap(1, 2);
         }
         let [p0, p1, p2] = corners.map(|c| self.instance.transform.transform_point3(self.mesh.positions[c]));
-        let within = |p: Vec3| p.abs().max_element() <= MAX_COORDINATE && p.is_finite();
-        let scaled_normal = (p1 - p0).cross(p2 - p0);
-        if !(within(p0) && within(p1) && within(p2)) || scaled_normal.length() < MIN_TWICE_AREA {
-            return None;
-        }
-        let face = scaled_normal.normalize();
+        let face = face_normal([p0, p1, p2])?;
         let has_tangents = !self.mesh.tangents.is_empty();
         let normals = corners.map(|c| {
             let normal = self.mesh.normals.get(c).and_then(|n| (self.normal_matrix * *n).try_normalize());
@@ -162,6 +161,13 @@ impl<'a> Placed<'a> {
             flags: flags | angles[2] << 16,
         })
     }
+}
+
+/// The unit normal of a triangle in world space, or none if it has no area or does not lie within the world.
+pub(in crate::scene) fn face_normal([p0, p1, p2]: [Vec3; 3]) -> Option<Vec3> {
+    let within = |p: Vec3| p.abs().max_element() <= MAX_COORDINATE && p.is_finite();
+    let scaled = (p1 - p0).cross(p2 - p0);
+    (within(p0) && within(p1) && within(p2) && scaled.length() >= MIN_TWICE_AREA).then(|| scaled.normalize())
 }
 
 fn finite_or_zero(uv: Vec2) -> Vec2 {

@@ -27,7 +27,11 @@ impl<'a> Buffers<'a> {
                 return Err(document.bad(format!("{place}.byteLength"), what));
             }
             match &mut bytes {
-                Cow::Owned(bytes) => bytes.truncate(length),
+                Cow::Owned(bytes) => {
+                    bytes.truncate(length);
+                    // A small buffer at the start of a large file shall not keep all of it.
+                    bytes.shrink_to_fit();
+                }
                 Cow::Borrowed(slice) => *slice = slice.get(..length).unwrap_or_default(),
             }
             buffers.push(bytes);

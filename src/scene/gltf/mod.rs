@@ -27,8 +27,6 @@ use container::Document;
 pub const SUPPORTED_EXTENSIONS: &[&str] =
     &["KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_texture_transform"];
 
-/// Most triangles a scene may have once its instances are counted.
-pub const MAX_TRIANGLES: u64 = 50_000_000;
 /// Most placements of meshes a scene may have.
 pub const MAX_INSTANCES: u64 = 4_000_000;
 /// Most bytes of vertices and indices a scene may have before instancing.

@@ -3,9 +3,9 @@
 use super::buffers::Buffers;
 use super::container::Document;
 use super::mesh::{self, Budget};
-use super::{MAX_INSTANCES, MAX_TRIANGLES, camera, lights};
+use super::{MAX_INSTANCES, camera, lights};
 use crate::error::Result;
-use crate::scene::{Camera, Instance, Scene};
+use crate::scene::{Camera, Instance, MAX_TRIANGLES, Scene};
 use glam::{Mat4, Quat, Vec3, Vec4};
 use gltf::json::Node;
 
