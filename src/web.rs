@@ -255,7 +255,7 @@ fn camera_from_json(json: &str) -> crate::Result<Camera> {
     };
     let unit = |key: &str| vector(key)?.try_normalize().ok_or_else(|| bad(&format!("{key} has no direction")));
     let projection = match (number(&value["vertical_fov"]), number(&value["half_height"])) {
-        (Some(vertical_fov), _) if vertical_fov > 0.0 && vertical_fov < 3.14 => {
+        (Some(vertical_fov), _) if vertical_fov > 0.0 && vertical_fov < std::f32::consts::PI => {
             Projection::Perspective { vertical_fov }
         }
         (_, Some(half_height)) if half_height > 0.0 => Projection::Orthographic { half_height },
