@@ -1,9 +1,12 @@
 //! Flattening, seen from outside: geometry against brute force, built-in scenes, bytes and hostile bytes.
 
-use glam::{Mat4, Vec2, Vec3, Vec4};
+use glam::{Mat4, Vec2, Vec3, Vec3A, Vec4};
+use obvhs::bvh2::Bvh2;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+use obvhs::ray::{Ray, RayHit};
 use restir::Error;
 use restir::scene::gpu_types::{
-    LIGHT_ENVIRONMENT, NONE, TRIANGLE_BITANGENT_SHIFT, TRIANGLE_DOUBLE_SIDED, TRIANGLE_TANGENTS,
+    LIGHT_ENVIRONMENT, NONE, TRIANGLE_BITANGENT_SHIFT, TRIANGLE_DOUBLE_SIDED, TRIANGLE_TANGENTS, Triangle,
 };
 use restir::scene::intersect::{Hit, intersect_cpu, intersect_triangle};
 use restir::scene::random::Random;
@@ -74,6 +77,47 @@ fn closest_hits_equal_brute_force() {
         }
     }
     assert!(hits > 1000, "{hits} hits test little");
+}
+
+/// obvhs's own tree over the same triangles, walked and intersected by obvhs.
+fn obvhs_closest(tree: &Bvh2, triangles: &[obvhs::triangle::Triangle], origin: Vec3, direction: Vec3) -> Option<f32> {
+    let mut hit = RayHit::none();
+    let ray = Ray::new_inf(origin.into(), direction.into());
+    let triangle = |i: usize| &triangles[tree.primitive_indices[i] as usize];
+    tree.ray_traverse(ray, &mut hit, |ray, i| triangle(i).intersect(ray));
+    hit.t.is_finite().then_some(hit.t)
+}
+
+#[test]
+fn closest_hits_equal_those_of_obvhs() {
+    let mut scene = soup(20_000, 5);
+    scene.materials[0].double_sided = true;
+    let flat = flatten(&scene);
+    let corners = |t: &Triangle| [t.p0, t.p1, t.p2].map(Vec3A::from);
+    let triangles: Vec<_> =
+        flat.triangles.iter().map(corners).map(|[v0, v1, v2]| obvhs::triangle::Triangle { v0, v1, v2 }).collect();
+    let boxes: Vec<_> = triangles.iter().map(obvhs::triangle::Triangle::aabb).collect();
+    let indices = (0..boxes.len() as u32).collect();
+    let tree = PlocBuilder::new().build(PlocSearchDistance::Low, &boxes, indices, SortPrecision::U64, 0);
+
+    let mut random = Random::new(6);
+    let (mut hits, mut mismatches) = (0, 0);
+    for i in 0..20_000 {
+        let (origin, direction) = (random.in_box(Vec3::splat(-2.0), Vec3::splat(2.0)), random.direction());
+        let found = intersect_cpu(&flat, origin, direction, f32::MAX).map(|hit| hit.t);
+        let expected = obvhs_closest(&tree, &triangles, origin, direction);
+        if i % 20 == 0 {
+            assert_eq!(found, brute_force(&flat, origin, direction, f32::MAX).map(|hit| hit.t), "{origin} {direction}");
+        }
+        hits += u32::from(found.is_some());
+        mismatches += u32::from(match (found, expected) {
+            (Some(a), Some(b)) => (a - b).abs() > 1e-4 * a.max(0.1),
+            (a, b) => a.is_some() != b.is_some(),
+        });
+    }
+    // The two round differently: a ray through an edge may go either way.
+    assert!(mismatches <= 2, "{mismatches} of {hits}");
+    assert!(hits > 5000 && hits < 20_000, "{hits} hits test little");
 }
 
 #[test]
@@ -260,7 +304,10 @@ fn sees_something(flat: &FlatScene) -> bool {
 
 #[test]
 fn a_million_lights_fit() {
-    let flat = flatten(&builtin::make("many-lights:1000000").expect("in range"));
+    let scene = builtin::make("many-lights:1000000").expect("in range");
+    let start = std::time::Instant::now();
+    let flat = flatten(&scene);
+    assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
     assert_eq!(flat.stats.emissive_triangles, 1_000_000);
     for bytes in [size_of_val(&flat.triangles[..]), size_of_val(&flat.nodes[..]), size_of_val(&flat.lights[..])] {
         assert!(bytes <= 128 << 20, "{bytes}");

@@ -796,9 +796,18 @@ fn environment_values_are_clamped_and_counted() {
 #[test]
 fn broken_environments_are_refused() {
     let good = exr_file(8, 4, |x, y| (x as f32, y as f32, 1.0));
-    let window = good.windows(10).position(|bytes| bytes == b"dataWindow").unwrap() + 10 + 1 + 6 + 4;
-    let sized = |x: i32, y: i32| {
-        let mut file = good.clone();
+    // Of scan lines: with another width it has as many chunks.
+    let high = {
+        use exr::prelude::{Encoding, Image, Layer, LayerAttributes, SpecificChannels, WritableImage};
+        let channels = SpecificChannels::rgb(|_: exr::prelude::Vec2<usize>| (1.0f32, 1.0f32, 1.0f32));
+        let layer = Layer::new((1, 2100), LayerAttributes::default(), Encoding::SMALL_LOSSLESS, channels);
+        let mut file = std::io::Cursor::new(Vec::new());
+        Image::from_layer(layer).write().non_parallel().to_buffered(&mut file).unwrap();
+        file.into_inner()
+    };
+    let sized = |file: &[u8], x: i32, y: i32| {
+        let window = file.windows(10).position(|bytes| bytes == b"dataWindow").unwrap() + 10 + 1 + 6 + 4;
+        let mut file = file.to_vec();
         file[window + 8..window + 12].copy_from_slice(&x.to_le_bytes());
         file[window + 12..window + 16].copy_from_slice(&y.to_le_bytes());
         file
@@ -808,9 +817,9 @@ fn broken_environments_are_refused() {
         ("no EXR", b"hello, world".to_vec(), "BAD_FILE"),
         ("cut off", good[..good.len() - 40].to_vec(), "BAD_FILE"),
         ("header cut off", good[..30].to_vec(), "BAD_FILE"),
-        ("absurdly wide", sized(1_000_000, 3), "LIMIT"),
-        ("too many texels", sized(16_000, 16_000), "LIMIT"),
-        ("window of i32::MAX", sized(i32::MAX, i32::MAX), "BAD_FILE"),
+        ("absurdly wide", sized(&good, 1_000_000, 3), "BAD_FILE"),
+        ("too many texels", sized(&high, 16_383, 2099), "LIMIT"),
+        ("window of i32::MAX", sized(&good, i32::MAX, i32::MAX), "BAD_FILE"),
     ];
     for (name, file, code) in cases {
         let error = environment::decode("sky.exr", &file).err().unwrap_or_else(|| panic!("{name}: decoded"));
@@ -820,13 +829,80 @@ fn broken_environments_are_refused() {
     }
 }
 
+/// A decoder of DWA or B44 would believe sizes that stand within the compressed blocks.
+#[test]
+fn environments_compressed_with_loss_are_refused() {
+    let mut file = exr_file(8, 4, |_, _| (1.0, 1.0, 1.0));
+    let name = b"compression\0compression\0";
+    let value = file.windows(name.len()).position(|bytes| bytes == name).unwrap() + name.len() + 4;
+    for (code, refused) in [(2, false), (6, true), (7, true), (8, true), (9, true)] {
+        file[value] = code;
+        let error = environment::decode("sky.exr", &file).err().map(|error| error.code());
+        assert_eq!(error == Some("UNSUPPORTED"), refused, "compression {code}: {error:?}");
+    }
+}
+
+/// A Radiance file with these lines in its header; `rgbe` are its texels.
+fn hdr_file(header: &str, width: u32, height: u32, rgbe: &[[u8; 4]]) -> Vec<u8> {
+    let head = format!("#?RADIANCE\n{header}FORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n");
+    [head.as_bytes(), rgbe.as_flattened()].concat()
+}
+
+/// Mantissas of 1/256, exponents from 128: (128, 64, 0) at 129 is (1, 0.5, 0).
+#[test]
+fn radiance_environments_load() {
+    let texels = [[128, 64, 0, 129], [0, 0, 128, 130], [255, 3, 2, 0], [128, 128, 128, 136]];
+    let environment = environment::decode("sky.hdr", &hdr_file("", 2, 2, &texels)).unwrap();
+    assert_eq!((environment.width, environment.height), (2, 2));
+    let expected = [[1.0, 0.5, 0.0], [0.0, 0.0, 2.0], [0.0; 3], [128.0; 3]];
+    for (found, expected) in environment.pixels.iter().flatten().zip(expected.as_flattened()) {
+        assert!((found - expected).abs() < 1e-30, "{found} {expected}");
+    }
+    let exposed = environment::decode("sky.hdr", &hdr_file("EXPOSURE=2\nEXPOSURE=2\n", 2, 2, &texels)).unwrap();
+    assert_eq!(exposed.pixels[3], [32.0; 3]);
+    let (bright, clamped) = environment::decode_counting("sky.hdr", &hdr_file("", 1, 1, &[[128, 1, 0, 255]])).unwrap();
+    assert_eq!((bright.pixels[0][0], clamped), (environment::MAX_RADIANCE, 2));
+}
+
+#[test]
+fn broken_radiance_environments_are_refused() {
+    let good = hdr_file("", 2, 2, &[[128, 64, 0, 129]; 4]);
+    let sized = |width, height| hdr_file("", width, height, &[[128, 64, 0, 129]; 4]);
+    let cases = [
+        ("signature alone", b"#?RADIANCE".to_vec(), "BAD_FILE"),
+        ("cut off", good[..good.len() - 3].to_vec(), "BAD_FILE"),
+        ("no texels", sized(0, 2), "BAD_FILE"),
+        ("absurdly wide", sized(1_000_000, 3), "BAD_FILE"),
+        ("absurdly wide and high", sized(u32::MAX, u32::MAX), "UNSUPPORTED"),
+        ("too many texels", sized(16_000, 16_000), "LIMIT"),
+        ("larger than its bytes", sized(8000, 4000), "BAD_FILE"),
+        ("exposed to nothing", hdr_file("EXPOSURE=0\n", 2, 2, &[[128; 4]; 4]), "BAD_FILE"),
+        ("another colour space", b"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n1111".to_vec(), "UNSUPPORTED"),
+        ("upside down", b"#?RADIANCE\n\n+Y 1 +X 1\n1111".to_vec(), "UNSUPPORTED"),
+    ];
+    for (name, file, code) in cases {
+        let error = environment::decode("sky.hdr", &file).err().unwrap_or_else(|| panic!("{name}: decoded"));
+        let message = error.to_string();
+        assert_eq!(error.code(), code, "{name}: {message}");
+        assert!(message.contains("sky.hdr") && !message.contains('\n'), "{name}: {message}");
+    }
+}
+
 #[test]
 fn mutated_environments_do_no_harm() {
-    let good = exr_file(8, 4, |x, y| (x as f32, y as f32, 1.0));
+    let goods = [
+        exr_file(8, 4, |x, y| (x as f32, y as f32, 1.0)),
+        hdr_file("EXPOSURE=2\n", 8, 4, &[[128, 64, 0, 129]; 32]),
+        // Runs of the old kind and, in the second row, of the new.
+        hdr_file("", 8, 2, &[[9, 9, 9, 128], [1, 1, 1, 7], [2, 2, 0, 8], [136, 5, 136, 6], [136, 7, 136, 128]]),
+    ];
     let mut random = Random(99);
-    for _ in 0..2000 {
-        if let Ok(environment) = environment::decode("sky.exr", &mutate(&good, &mut random)) {
-            assert!(environment.pixels.iter().flatten().all(|value| value.is_finite() && *value >= 0.0));
+    for good in goods {
+        assert!(environment::decode("sky", &good).is_ok());
+        for _ in 0..2000 {
+            if let Ok(environment) = environment::decode("sky", &mutate(&good, &mut random)) {
+                assert!(environment.pixels.iter().flatten().all(|value| value.is_finite() && *value >= 0.0));
+            }
         }
     }
 }

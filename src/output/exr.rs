@@ -171,6 +171,14 @@ pub fn read_exr(path: &std::path::Path) -> Result<Image> {
 /// could hold (checked before anything is allocated for them); [`Error::Unsupported`] for deep or subsampled pixels and
 /// for B44 and DWA compression.
 pub fn decode_exr(name: &str, bytes: &[u8]) -> Result<Image> {
+    decode_exr_within(name, bytes, usize::MAX)
+}
+
+/// [`decode_exr`] of at most `max_pixels`.
+///
+/// # Errors
+/// [`Error::Limit`] where a part has more pixels; otherwise as [`decode_exr`].
+pub(crate) fn decode_exr_within(name: &str, bytes: &[u8], max_pixels: usize) -> Result<Image> {
     let bad = |place: &str, what: String| Error::bad_file(name, place, what);
     let library = |place: &str, error: ::exr::error::Error| match error {
         ::exr::error::Error::NotSupported(what) => Error::Unsupported { file: name.to_owned(), what: what.into() },
@@ -186,6 +194,14 @@ pub fn decode_exr(name: &str, bytes: &[u8]) -> Result<Image> {
         let Vec2(width, height) = header.layer_size;
         if width == 0 || height == 0 || width.max(height) > MAX_SIDE as usize {
             return Err(bad("dataWindow", format!("{width}x{height} is not within 1x1 and {MAX_SIDE}x{MAX_SIDE}")));
+        }
+        if width * height > max_pixels {
+            return Err(Error::Limit {
+                what: format!("{name}: the picture"),
+                wanted: (width * height) as u64,
+                had: max_pixels as u64,
+                unit: "pixels",
+            });
         }
         if !COMPRESSIONS.contains(&header.compression) {
             return Err(Error::Unsupported {

@@ -1,9 +1,10 @@
 //! The flattened BVH: built by obvhs, laid out for traversal.
 
 use super::gpu_types::{BvhNode, Triangle};
-use glam::Vec3A;
 use obvhs::aabb::Aabb;
-use obvhs::bvh2::{Bvh2, node::Bvh2Node, reinsertion::ReinsertionOptimizer};
+use obvhs::bvh2::{Bvh2, leaf_collapser::collapse, reinsertion::ReinsertionOptimizer};
+use obvhs::ploc::morton::morton_encode_u128_unorm;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 /// No path from the root is longer than this, in nodes: the size of the traversal's stack (`shaders/scene/bvh.wgsl`).
 pub const MAX_DEPTH: u32 = 60;
@@ -23,15 +24,18 @@ pub struct Bvh {
 
 /// Builds over `triangles`: at least one, all corners finite.
 ///
-/// Top-down by binned SAH (Wald 2007), then improved by obvhs's reinsertion (Meister and Bittner 2018). obvhs's own
-/// bottom-up builder is not used, for equal boxes make it take quadratic time: a hostile file could hang it.
+/// Clustered bottom-up by obvhs (PLOC, Meister and Bittner 2018), improved by reinsertion (the same, 2018), leaves merged
+/// by SAH. Where clustering would take too long, or the tree comes out deeper than [`MAX_DEPTH`], halves by count are
+/// used instead, whose depth is logarithmic.
 pub fn build(triangles: &[Triangle]) -> Bvh {
     let boxes: Vec<Aabb> = triangles.iter().map(bounds_of).collect();
-    let mut tree = split(&boxes);
-    let plain = layout(&tree);
-    optimize(&mut tree);
-    let optimized = layout(&tree);
-    if optimized.depth <= MAX_DEPTH { optimized } else { plain }
+    if clusters_quickly(&boxes) {
+        let clustered = layout(&cluster(&boxes));
+        if clustered.depth <= MAX_DEPTH {
+            return clustered;
+        }
+    }
+    halve(&boxes)
 }
 
 /// SAH cost for a ray that hits the root's box: 1 for a node tested, 1 for a triangle tested.
@@ -53,131 +57,94 @@ fn bounds_of(triangle: &Triangle) -> Aabb {
     Aabb::new(p0.min(p1).min(p2).into(), p0.max(p1).max(p2).into())
 }
 
-/// The tree before it is improved, never deeper than [`MAX_DEPTH`].
-fn split(boxes: &[Aabb]) -> Bvh2 {
-    let centers: Vec<Vec3A> = boxes.iter().map(Aabb::center).collect();
+/// Clusters and optimises. obvhs's own one-call builders ask for the time, which panics on wasm; this is what they do.
+fn cluster(boxes: &[Aabb]) -> Bvh2 {
+    /// The fraction of the nodes that the first pass of reinsertion tries to move.
+    const BATCH: f32 = 0.05;
+    /// Reinsertion can deepen the tree, and panics where its stack, of twice this, is full.
+    const STACK_DEPTH: usize = 512;
+    let mut tree = run_ploc(&mut PlocBuilder::with_capacity(boxes.len()), boxes);
+    tree.max_depth = tree.max_depth.max(STACK_DEPTH);
+    let mut optimizer = ReinsertionOptimizer::default();
+    optimizer.run(&mut tree, BATCH, None);
+    collapse(&mut tree, MAX_LEAF, 1.0);
+    optimizer.run(&mut tree, 2.0 * BATCH, None);
+    tree
+}
+
+fn run_ploc(builder: &mut PlocBuilder, boxes: &[Aabb]) -> Bvh2 {
+    /// The first passes look only at direct neighbours, which is faster.
+    const SINGLE_NEIGHBOR_PASSES: usize = 3;
+    let indices = (0..boxes.len() as u32).collect();
+    // With 42 bits an axis, a small thing in a large scene is ordered well, too.
+    builder.build(PlocSearchDistance::Medium, boxes, indices, SortPrecision::U128, SINGLE_NEIGHBOR_PASSES)
+}
+
+/// Whether PLOC takes few passes, or the boxes are few.
+///
+/// A pass merges the boxes that are each other's nearest within the search distance, in Morton order: normally a fixed
+/// fraction of all. But where boxes coincide, lie within each other or ever farther apart, each is nearest to the next: a
+/// pass merges one pair, and n boxes take n passes of up to n. Such a run takes as many passes in a part of the order as
+/// in the whole, so clustering it block by block shows it, in time linear in the number of blocks.
+fn clusters_quickly(boxes: &[Aabb]) -> bool {
+    /// Boxes of a block; so many are clustered in milliseconds at worst.
+    const BLOCK: usize = 1024;
+    /// Most passes for a block; about 20 are normal.
+    const MAX_PASSES: usize = 256;
+    /// Most boxes with the same Morton code: their order is that of the file, which a block need not show.
+    const MAX_EQUAL: usize = 64;
+    if boxes.len() <= BLOCK {
+        return true;
+    }
+    let bounds = boxes.iter().fold(Aabb::empty(), |all, part| all.union(part));
+    let scale = bounds.diagonal().as_dvec3().recip();
+    let code = |part: &Aabb| morton_encode_u128_unorm((part.center() - bounds.min).as_dvec3() * scale);
+    let mut order: Vec<(u128, u32)> = boxes.iter().map(code).zip(0..).collect();
+    order.sort_unstable();
+    if order.windows(MAX_EQUAL + 1).any(|run| run[0].0 == run[MAX_EQUAL].0) {
+        return false;
+    }
+    // With the corners of the whole, the Morton order of a block is that of the whole.
+    let corners = [bounds.min, bounds.max].map(Aabb::from_point);
+    let mut builder = PlocBuilder::new();
+    order.chunks(BLOCK).all(|block| {
+        let part: Vec<Aabb> = block.iter().map(|&(_, i)| boxes[i as usize]).chain(corners).collect();
+        // obvhs sets this to the number of passes where that is above 96.
+        run_ploc(&mut builder, &part).max_depth <= MAX_PASSES
+    })
+}
+
+/// Splits at the median along the longest axis of the centers until a leaf is full: depth log2(n), whatever the shape.
+fn halve(boxes: &[Aabb]) -> Bvh {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
-    let mut nodes = vec![Bvh2Node::default()];
+    let mut nodes: Vec<BvhNode> = vec![bytemuck::Zeroable::zeroed()];
+    let mut deepest = 0;
+    let center = |i: u32| boxes[i as usize].center();
+    // (node, its part of the order, depth)
     let mut pending = vec![(0usize, 0..order.len(), 1u32)];
     while let Some((target, range, depth)) = pending.pop() {
+        deepest = deepest.max(depth);
         let part = &mut order[range.clone()];
-        let mut bounds = Aabb::empty();
-        let mut center_bounds = Aabb::empty();
+        let (mut bounds, mut centers) = (Aabb::empty(), Aabb::empty());
         for &i in part.iter() {
             bounds = bounds.union(&boxes[i as usize]);
-            center_bounds.extend(centers[i as usize]);
+            centers.extend(center(i));
         }
-        let cut = if depth < HALVES_FROM { best_cut(part, boxes, &centers, &center_bounds) } else { None };
-        let cost = cut.as_ref().map_or(f32::INFINITY, |cut| bounds.half_area() + cut.cost);
-        let fits = part.len() <= MAX_LEAF as usize;
-        if part.len() == 1 || (fits && cost >= bounds.half_area() * part.len() as f32) {
-            nodes[target] = Bvh2Node::new(bounds, part.len() as u32, range.start as u32);
-            continue;
-        }
-        let middle = match cut {
-            Some(cut) => partition(part, |i| cut.bins.of(centers[i as usize]) <= cut.bin),
-            None => halve(part, &centers, &center_bounds),
+        let (min, max) = (bounds.min.into(), bounds.max.into());
+        nodes[target] = if part.len() <= MAX_LEAF as usize {
+            BvhNode { min, first: range.start as u32, max, count: part.len() as u32 }
+        } else {
+            let axis = centers.diagonal().max_position();
+            let middle = part.len() / 2;
+            part.select_nth_unstable_by(middle, |&a, &b| center(a)[axis].total_cmp(&center(b)[axis]));
+            let left = nodes.len();
+            nodes.resize(left + 2, bytemuck::Zeroable::zeroed());
+            pending.push((left + 1, range.start + middle..range.end, depth + 1));
+            pending.push((left, range.start..range.start + middle, depth + 1));
+            BvhNode { min, first: left as u32, max, count: 0 }
         };
-        let left = nodes.len();
-        nodes[target] = Bvh2Node::new(bounds, 0, left as u32);
-        nodes.resize(left + 2, Bvh2Node::default());
-        pending.push((left + 1, range.start + middle..range.end, depth + 1));
-        pending.push((left, range.start..range.start + middle, depth + 1));
     }
-    Bvh2 { nodes, primitive_indices: order, max_depth: STACK_DEPTH, ..Bvh2::default() }
-}
-
-/// Below this depth nodes are split into halves by count, so that 2^28 triangles still fit in [`MAX_DEPTH`].
-const HALVES_FROM: u32 = 30;
-/// What reinsertion can make of the depth, generously: the size of its stacks.
-const STACK_DEPTH: usize = 512;
-const BINS: usize = 16;
-
-/// Equal intervals of the centers along one axis.
-struct Bins {
-    axis: usize,
-    start: f32,
-    scale: f32,
-}
-
-impl Bins {
-    fn of(&self, center: Vec3A) -> usize {
-        (((center[self.axis] - self.start) * self.scale) as usize).min(BINS - 1)
-    }
-}
-
-/// Bins 0 to `bin` go left. `cost` is the sum over both sides of half area x triangles.
-struct Cut {
-    bins: Bins,
-    bin: usize,
-    cost: f32,
-}
-
-/// The cheapest cut along any axis; none if the centers coincide.
-fn best_cut(part: &[u32], boxes: &[Aabb], centers: &[Vec3A], center_bounds: &Aabb) -> Option<Cut> {
-    let extent = center_bounds.diagonal();
-    let mut best: Option<Cut> = None;
-    for axis in 0..3 {
-        let bins = Bins { axis, start: center_bounds.min[axis], scale: BINS as f32 / extent[axis] };
-        if !bins.scale.is_finite() {
-            continue;
-        }
-        let mut counts = [0usize; BINS];
-        let mut bounds = [Aabb::empty(); BINS];
-        for &i in part {
-            let bin = bins.of(centers[i as usize]);
-            counts[bin] += 1;
-            bounds[bin] = bounds[bin].union(&boxes[i as usize]);
-        }
-        let side_cost = |bounds: &Aabb, count: usize| if count == 0 { 0.0 } else { bounds.half_area() * count as f32 };
-        let mut right_costs = [0.0; BINS];
-        let (mut side, mut count) = (Aabb::empty(), 0);
-        for bin in (1..BINS).rev() {
-            side = side.union(&bounds[bin]);
-            count += counts[bin];
-            right_costs[bin] = side_cost(&side, count);
-        }
-        (side, count) = (Aabb::empty(), 0);
-        for bin in 0..BINS - 1 {
-            side = side.union(&bounds[bin]);
-            count += counts[bin];
-            let cost = side_cost(&side, count) + right_costs[bin + 1];
-            let proper = count > 0 && count < part.len();
-            if proper && best.as_ref().is_none_or(|best| cost < best.cost) {
-                best = Some(Cut { bins: Bins { ..bins }, bin, cost });
-            }
-        }
-    }
-    best
-}
-
-/// Moves what goes left to the front; how many do.
-fn partition(part: &mut [u32], goes_left: impl Fn(u32) -> bool) -> usize {
-    let mut middle = 0;
-    for i in 0..part.len() {
-        if goes_left(part[i]) {
-            part.swap(i, middle);
-            middle += 1;
-        }
-    }
-    middle
-}
-
-/// Halves by count along the longest axis of the centers.
-fn halve(part: &mut [u32], centers: &[Vec3A], center_bounds: &Aabb) -> usize {
-    let axis = center_bounds.diagonal().max_position();
-    let middle = part.len() / 2;
-    part.select_nth_unstable_by(middle, |&a, &b| centers[a as usize][axis].total_cmp(&centers[b as usize][axis]));
-    middle
-}
-
-/// Moves subtrees to where they cost less, the largest first.
-fn optimize(tree: &mut Bvh2) {
-    /// The fraction of the nodes that the first pass tries to move, and the most nodes it tries.
-    const BATCH: f32 = 0.5;
-    const MAX_BATCH: f32 = 100_000.0;
-    let batch = BATCH.min(MAX_BATCH / tree.nodes.len() as f32);
-    ReinsertionOptimizer::default().run(tree, batch, None);
+    Bvh { nodes, order, depth: deepest }
 }
 
 /// Copies an obvhs tree depth first, siblings together, so that what is near in the tree is near in memory.
@@ -214,7 +181,9 @@ fn layout(bvh: &Bvh2) -> Bvh {
 mod tests {
     use super::*;
     use crate::scene::random::Random;
-    use glam::Vec3;
+    use glam::{UVec3, Vec3};
+    use std::f32::consts::{PI, TAU};
+    use std::time::{Duration, Instant};
 
     fn triangle(corners: [Vec3; 3]) -> Triangle {
         let [p0, p1, p2] = corners;
@@ -277,17 +246,99 @@ mod tests {
         }
     }
 
-    #[test]
-    fn reinsertion_improves_a_soup() {
-        let triangles = soup(5000, 3);
-        let boxes: Vec<Aabb> = triangles.iter().map(bounds_of).collect();
-        let (plain, optimized) = (cost(&layout(&split(&boxes)).nodes), cost(&build(&triangles).nodes));
-        assert!(optimized < 0.98 * plain, "{optimized} {plain}");
+    fn boxes_of(triangles: &[Triangle]) -> Vec<Aabb> {
+        triangles.iter().map(bounds_of).collect()
     }
 
     #[test]
-    fn coincident_triangles() {
-        checked(&vec![triangle([Vec3::ZERO, Vec3::X, Vec3::Y]); 100_000]);
+    fn halves_hold_their_contents() {
+        for count in [1, 4, 5, 100, 5000] {
+            let triangles = soup(count, 7);
+            check(&halve(&boxes_of(&triangles)), &triangles);
+        }
+    }
+
+    #[test]
+    fn a_clustered_soup_is_better_than_halves() {
+        let triangles = soup(5000, 3);
+        let (built, halves) = (cost(&build(&triangles).nodes), cost(&halve(&boxes_of(&triangles)).nodes));
+        assert!(built < 0.9 * halves, "{built} {halves}");
+    }
+
+    /// At `at`, in a box of about `size`.
+    fn small(at: Vec3, size: f32) -> Triangle {
+        triangle([at, at + size * Vec3::X, at + size * Vec3::new(0.3, 1.0, 0.2)])
+    }
+
+    /// Centred at the origin.
+    fn shell(size: f32) -> Triangle {
+        triangle([Vec3::new(-size, -size, -size), Vec3::new(size, -size, size), Vec3::new(0.0, size, 0.0)])
+    }
+
+    /// What would take minutes to cluster is built in time.
+    #[test]
+    fn hostile_inputs_are_halved() {
+        let count = 100_000;
+        let each = |triangle: &dyn Fn(u32) -> Triangle| (0..count).map(triangle).collect::<Vec<_>>();
+        let cases = [
+            ("coincident", each(&|_| small(Vec3::ZERO, 1.0))),
+            ("concentric", each(&|i| shell(1.0 + i as f32))),
+            ("nested", each(&|i| small(Vec3::splat(-(i as f32)), 1.0 + 3.0 * i as f32))),
+            ("ever larger and farther", each(&|i| small(1.0003f32.powi(i as i32) * Vec3::X, 1.0003f32.powi(i as i32)))),
+            ("ever farther", each(&|i| small((i as f32).powi(2) * Vec3::X, 1.0))),
+            ("a row of equal boxes", each(&|i| small(i as f32 * Vec3::X, 0.8))),
+            // Pairs merge, then the pairs are in a row.
+            ("pairs in a row", each(&|i| small((i / 2) as f32 * Vec3::X, 0.8))),
+            ("half of them coincident", soup(count as usize / 2, 5).into_iter().chain(each(&|_| shell(0.1))).collect()),
+        ];
+        for (name, triangles) in cases {
+            let start = Instant::now();
+            assert!(!clusters_quickly(&boxes_of(&triangles)), "{name}");
+            let bvh = checked(&triangles);
+            assert!(start.elapsed() < Duration::from_secs(3), "{name}: {:?}", start.elapsed());
+            assert!(bvh.depth <= 18, "{name}: {}", bvh.depth);
+        }
+    }
+
+    #[test]
+    fn regular_inputs_are_clustered() {
+        let grid = |n: u32, spacing: f32| -> Vec<Triangle> {
+            let at = |i: u32| spacing * Vec3::new((i % n) as f32, 0.0, (i / n) as f32);
+            (0..n * n).map(|i| small(at(i), 0.8 * spacing)).collect()
+        };
+        let block = |n: u32| -> Vec<Triangle> {
+            let at = |i: u32| UVec3::new(i % n, i / n % n, i / n / n).as_vec3();
+            (0..n * n * n).map(|i| small(at(i), 0.5)).collect()
+        };
+        // Pole to pole, of two triangles each: they have the same box where the sides are along the axes.
+        let quads = |n: u32, at: &dyn Fn(u32, u32) -> Vec3| -> Vec<Triangle> {
+            let corners = |i, j| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            let halves = |[a, b, c, d]: [Vec3; 4]| [triangle([a, b, c]), triangle([a, c, d])];
+            (0..n * n).flat_map(|k| halves(corners(k % n, k / n))).collect()
+        };
+        let sphere = |i: u32, j: u32| {
+            let ((sin_theta, cos_theta), (sin_phi, cos_phi)) =
+                ((i as f32 * PI / 200.0).sin_cos(), (j as f32 * TAU / 200.0).sin_cos());
+            Vec3::new(sin_theta * cos_phi, cos_theta, sin_theta * sin_phi)
+        };
+        let cases = [
+            ("a grid", grid(300, 1.0)),
+            ("a grid with rounding", grid(300, 0.1)),
+            ("a grid of a power of two", grid(256, 1.0)),
+            ("a block", block(40)),
+            ("a plane of squares", quads(300, &|i, j| Vec3::new(i as f32, 0.0, j as f32))),
+            ("a sphere", quads(200, &sphere)),
+            ("a soup", soup(100_000, 6)),
+            ("8 copies of each", soup(2000, 8).iter().flat_map(|t| [*t; 8]).collect()),
+        ];
+        for (name, triangles) in cases {
+            let start = Instant::now();
+            assert!(clusters_quickly(&boxes_of(&triangles)), "{name}");
+            let bvh = checked(&triangles);
+            assert!(start.elapsed() < Duration::from_secs(3), "{name}: {:?}", start.elapsed());
+            let halves = cost(&halve(&boxes_of(&triangles)).nodes);
+            assert!(cost(&bvh.nodes) < halves, "{name}: {} {halves}", cost(&bvh.nodes));
+        }
     }
 
     #[test]
@@ -298,21 +349,19 @@ mod tests {
         checked(&triangles);
     }
 
-    /// Each triangle encloses all before it, or lies ever farther out: one falls off at every split.
+    /// Few triangles are always clustered. Where each encloses all before it, or lies ever farther out, that makes a chain.
     #[test]
-    fn hostile_sizes_and_gaps_stay_within_the_stack() {
-        let nested = |i: i32| {
-            let size = 1.1f32.powi(i);
-            triangle([Vec3::new(-size, -size, 0.0), Vec3::new(size, -size, 0.0), Vec3::new(0.0, size, size)])
-        };
-        checked(&(0..200).map(nested).collect::<Vec<_>>());
-        let apart = |i: i32| {
-            let at = Vec3::X * 20f32.powi(i / 8);
-            triangle([at, at * 1.001, at + 0.001 * at.length() * Vec3::Y])
-        };
-        let triangles: Vec<Triangle> = (-230..48).map(apart).collect();
-        checked(&triangles);
-        let boxes: Vec<Aabb> = triangles.iter().map(bounds_of).collect();
-        assert!(layout(&split(&boxes)).depth > HALVES_FROM, "not hostile enough to reach the halves");
+    fn deep_trees_are_halved() {
+        let apart = |i: i32| small(Vec3::X * 20f32.powi(i / 8), 1e-3 * 20f32.powi(i / 8));
+        let cases = [
+            ("nested", (0..200).map(|i| shell(1.1f32.powi(i))).collect::<Vec<_>>()),
+            ("apart", (-230..48).map(apart).collect()),
+        ];
+        for (name, triangles) in cases {
+            let boxes = boxes_of(&triangles);
+            assert!(clusters_quickly(&boxes), "{name}");
+            assert!(layout(&cluster(&boxes)).depth > MAX_DEPTH, "{name} is not hostile enough");
+            assert!(checked(&triangles).depth < 10, "{name}");
+        }
     }
 }

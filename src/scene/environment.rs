@@ -1,13 +1,12 @@
-//! Environment maps: OpenEXR files.
+//! Environment maps: OpenEXR and Radiance files.
 
 use super::Environment;
 use crate::error::{Error, Result};
-use exr::prelude::{ReadChannels, ReadLayers};
-use std::io::Cursor;
+use crate::output::{Image, MAX_SIDE, exr::decode_exr_within};
+use image::codecs::hdr::{HdrDecoder, SIGNATURE};
+use image::{ImageDecoder, ImageError};
 
-/// Longest side of an environment map in texels.
-pub const MAX_SIDE: usize = 16_384;
-/// Most texels of an environment map: 8192 x 4096.
+/// Most texels of an environment map: 8192 x 4096. No side is longer than [`MAX_SIDE`].
 pub const MAX_TEXELS: usize = 8192 * 4096;
 /// Radiance above this, and infinity, become this: sums over a whole map then stay finite in f32.
 pub const MAX_RADIANCE: f32 = 1.0e8;
@@ -21,13 +20,13 @@ pub fn load_file(path: &std::path::Path) -> Result<Environment> {
     decode(&path.display().to_string(), &super::files::read(path, 2 << 30)?)
 }
 
-/// Decodes an OpenEXR file: the first layer that has channels R, G and B, taken as linear Rec. 709 radiance. Its data
-/// window is the whole sphere. Texels are clamped to [0, [`MAX_RADIANCE`]], and one that is not a number becomes 0:
-/// [`decode_counting`] tells how many there were.
+/// Decodes an OpenEXR file (see [`decode_exr`](crate::output::decode_exr)) or a Radiance one (RGBE, rows from the top),
+/// taken as linear Rec. 709 radiance. The picture is the whole sphere. Texels are clamped to [0, [`MAX_RADIANCE`]], and
+/// one that is not a number becomes 0: [`decode_counting`] tells how many there were.
 ///
 /// # Errors
-/// [`Error::BadFile`] for a file that is not OpenEXR, broken, or has no such layer; [`Error::Limit`] for one that is
-/// too large. `name` is the file in these.
+/// [`Error::BadFile`] for a file that is neither, or broken; [`Error::Unsupported`] for pixels of another kind;
+/// [`Error::Limit`] for more than [`MAX_TEXELS`]. `name` is the file in these.
 pub fn decode(name: &str, bytes: &[u8]) -> Result<Environment> {
     decode_counting(name, bytes).map(|(environment, _)| environment)
 }
@@ -37,61 +36,54 @@ pub fn decode(name: &str, bytes: &[u8]) -> Result<Environment> {
 /// # Errors
 /// As [`decode`].
 pub fn decode_counting(name: &str, bytes: &[u8]) -> Result<(Environment, u64)> {
-    check_size(name, bytes)?;
-    let image = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .rgb_channels(
-            |size, _| (size.width(), vec![[0.0f32; 3]; size.area()]),
-            |(width, pixels), position, (r, g, b): (f32, f32, f32)| {
-                if let Some(pixel) = pixels.get_mut(position.y() * *width + position.x()) {
-                    *pixel = [r, g, b];
-                }
-            },
-        )
-        .first_valid_layer()
-        .all_attributes()
-        .non_parallel()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(|error| exr_error(name, "pixels", &error))?;
-    let size = image.layer_data.size;
-    let (_, mut pixels) = image.layer_data.channel_data.pixels;
+    let Image { width, height, mut pixels } = match bytes.starts_with(SIGNATURE) {
+        true => decode_hdr(name, bytes)?,
+        false => decode_exr_within(name, bytes, MAX_TEXELS)?,
+    };
     let mut clamped = 0;
     for value in pixels.iter_mut().flatten() {
         let valid = if value.is_nan() { 0.0 } else { value.clamp(0.0, MAX_RADIANCE) };
         clamped += u64::from(valid != *value);
         *value = valid;
     }
-    Ok((Environment { width: size.width() as u32, height: size.height() as u32, pixels }, clamped))
+    Ok((Environment { width, height, pixels }, clamped))
 }
 
-/// Refuses what is too large by its header alone.
-fn check_size(name: &str, bytes: &[u8]) -> Result<()> {
-    let metadata = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false);
-    let metadata = metadata.map_err(|error| exr_error(name, "header", &error))?;
-    for (index, header) in metadata.headers.iter().enumerate() {
-        let (width, height) = (header.layer_size.width(), header.layer_size.height());
-        if width == 0 || height == 0 {
-            return Err(Error::bad_file(name, format!("layer {index}"), "it has no texels"));
-        }
-        let limit = |what: &str, wanted: usize, had: usize, unit| Error::Limit {
-            what: format!("{name}: {what} of layer {index}"),
-            wanted: wanted as u64,
-            had: had as u64,
-            unit,
-        };
-        if width.max(height) > MAX_SIDE {
-            return Err(limit("a side", width.max(height), MAX_SIDE, "texels"));
-        }
-        if width * height > MAX_TEXELS {
-            return Err(limit("the picture", width * height, MAX_TEXELS, "texels"));
-        }
+/// A Radiance file: its values divided by its EXPOSURE, which is what they were multiplied by (Ward, "Radiance File
+/// Formats").
+fn decode_hdr(name: &str, bytes: &[u8]) -> Result<Image> {
+    let error = |place: &str, error: ImageError| match error {
+        ImageError::Unsupported(what) => Error::Unsupported { file: name.to_owned(), what: one_line(&what) },
+        other => Error::bad_file(name, place, one_line(&other)),
+    };
+    let decoder = HdrDecoder::new(bytes).map_err(|e| error("header", e))?;
+    let (width, height) = decoder.dimensions();
+    if width == 0 || height == 0 || width.max(height) > MAX_SIDE {
+        let what = format!("{width}x{height} is not within 1x1 and {MAX_SIDE}x{MAX_SIDE}");
+        return Err(Error::bad_file(name, "header", what));
     }
-    Ok(())
+    let texels = width as usize * height as usize;
+    if texels > MAX_TEXELS {
+        return Err(Error::Limit {
+            what: format!("{name}: the picture"),
+            wanted: texels as u64,
+            had: MAX_TEXELS as u64,
+            unit: "pixels",
+        });
+    }
+    let exposure = decoder.metadata().exposure.unwrap_or(1.0);
+    if !(exposure.is_finite() && exposure > 0.0) {
+        return Err(Error::bad_file(name, "header", format!("EXPOSURE={exposure}")));
+    }
+    let mut pixels = vec![[0.0f32; 3]; texels];
+    decoder.read_image(bytemuck::cast_slice_mut(&mut pixels)).map_err(|e| error("pixels", e))?;
+    for value in pixels.iter_mut().flatten() {
+        *value /= exposure;
+    }
+    Ok(Image { width, height, pixels })
 }
 
-/// An error of the decoder on one line.
-fn exr_error(name: &str, place: &str, error: &exr::error::Error) -> Error {
-    let what: String = error.to_string().chars().map(|c| if c.is_control() { ' ' } else { c }).take(160).collect();
-    Error::bad_file(name, place, what)
+/// A message of the decoder, which may quote the file.
+fn one_line(message: &dyn std::fmt::Display) -> String {
+    message.to_string().chars().map(|c| if c.is_control() { ' ' } else { c }).take(160).collect()
 }

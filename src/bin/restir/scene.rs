@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// What lights a scene beyond its own lights.
 #[derive(clap::Args)]
 pub struct Lighting {
-    /// Environment map (equirectangular OpenEXR, linear Rec. 709), instead of the scene's own.
+    /// Environment map (equirectangular OpenEXR or Radiance .hdr, linear Rec. 709), instead of the scene's own.
     #[arg(long, value_name = "FILE")]
     pub environment: Option<PathBuf>,
     /// Point lights to scatter in a scene that has no light at all; without this it gets an even white sky.
