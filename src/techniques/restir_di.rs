@@ -94,6 +94,8 @@ struct Buffers {
     reservoirs: [wgpu::Buffer; 3],
     /// Which of them holds the previous frame's final reservoirs.
     history: usize,
+    /// Whether there was a previous frame since the last start.
+    has_history: bool,
     indirect: wgpu::TextureView,
 }
 
@@ -131,7 +133,8 @@ impl Technique for RestirDi {
     fn prepare(&mut self, gpu: &Gpu, size: UVec2) -> Result<()> {
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&self.params));
         let slots = if self.params.reservoir_size == 1 { 4 } else { 1 };
-        if self.buffers.as_ref().is_some_and(|b| b.made_for == (size, slots)) {
+        if let Some(buffers) = self.buffers.as_mut().filter(|b| b.made_for == (size, slots)) {
+            buffers.has_history = false;
             return Ok(());
         }
         let bytes = u64::from(size.x) * u64::from(size.y) * u64::from(slots) * std::mem::size_of::<Reservoir>() as u64;
@@ -140,6 +143,7 @@ impl Technique for RestirDi {
             made_for: (size, slots),
             reservoirs: [make()?, make()?, make()?],
             history: 2,
+            has_history: false,
             indirect: gpu.texture("restir-di.indirect", size, wgpu::TextureFormat::Rgba32Float),
         });
         Ok(())
@@ -157,7 +161,8 @@ impl Technique for RestirDi {
             .bind("params", &self.uniform)
             .bind("reservoirs_out", &reservoirs[current])
             .dispatch_over(size)?;
-        if self.params.temporal_reuse == 1 {
+        // Without a history the pass would only copy; and the first picture need not wait for its pipeline.
+        if self.params.temporal_reuse == 1 && buffers.has_history {
             recorder
                 .pass(&table::RESTIR_DI_TEMPORAL)
                 .bind("params", &self.uniform)
@@ -193,6 +198,7 @@ impl Technique for RestirDi {
             .bind("reservoirs", &reservoirs[current])
             .bind("indirect_radiance", &buffers.indirect)
             .dispatch_over(size)?;
+        buffers.has_history = true;
         buffers.history = if self.params.spatial_feedback == 1 { current } else { found_in_time };
         Ok(())
     }
