@@ -137,8 +137,34 @@ fn wrong_usage_is_exit_code_2_and_does_nothing() {
         let output = restir(&args.iter().map(String::as_str).collect::<Vec<_>>());
         assert_eq!(output.status.code(), Some(2), "{args:?}: {}", stderr(&output));
         assert!(output.stdout.is_empty() && !output.stderr.is_empty(), "{args:?}");
+        // Without any argument there is help.
+        if !args.is_empty() {
+            let stderr = stderr(&output);
+            assert!(stderr.starts_with("error[") && stderr.lines().count() == 1, "{args:?}: {stderr}");
+        }
     }
+    fail(&["render", "builtin:cornell"], 2, "USAGE", "--out <FILE> (try --help)");
+    fail(&["paint"], 2, "USAGE", "'paint'");
     assert!(folder.names().is_empty());
+}
+
+#[test]
+fn help_and_version_are_no_errors() {
+    assert!(succeed(&["--help"]).contains("Usage: restir <COMMAND>"));
+    assert!(succeed(&["render", "--help"]).contains("--max-depth"));
+    assert_eq!(succeed(&["--version"]).trim(), format!("restir {}", env!("CARGO_PKG_VERSION")));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_stderr_changes_no_exit_code() {
+    let code = |args: &[&str]| {
+        let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+        Command::new(env!("CARGO_BIN_EXE_restir")).args(args).stderr(full).output().unwrap().status.code()
+    };
+    assert_eq!(code(&["render"]), Some(2));
+    assert_eq!(code(&["info", "missing.glb"]), Some(1));
+    assert_eq!(code(&["info", "builtin:nothing"]), Some(2));
 }
 
 #[test]
