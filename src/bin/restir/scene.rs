@@ -35,7 +35,11 @@ pub fn light(scene: &mut Scene, lighting: &Lighting, seed: u32) -> Result<()> {
     if let Some(file) = &lighting.environment {
         scene.environment = Some(environment::load_file(file)?);
     }
+    let own = scene.lights.len();
     scene.ensure_light(lighting.lights.unwrap_or(0), seed.into());
+    if lighting.lights.is_some() && scene.lights.len() == own {
+        scene.warnings.push("--lights does nothing here: the scene has light of its own".into());
+    }
     Ok(())
 }
 
