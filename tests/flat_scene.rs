@@ -207,6 +207,7 @@ fn useless_triangles_are_dropped_and_counted() {
 fn an_empty_scene_is_a_point_that_nothing_hits() {
     let flat = flatten(&Scene::default());
     assert_eq!((flat.nodes.len(), flat.nodes[0].count, flat.triangles.len()), (1, 1, 1));
+    assert_eq!(flat.stats.triangles, 0, "the point is no triangle of the scene");
     assert!(flat.lights.is_empty() && flat.environment.is_none());
     assert_eq!(intersect_cpu(&flat, Vec3::Z, Vec3::NEG_Z, 9.0), None);
     assert!(flat.bounds.iter().all(|corner| corner.is_finite()));
