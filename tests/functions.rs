@@ -83,7 +83,7 @@ fn words_below_a_bound_are_exact() {
     cases.extend([[u32::MAX; 2], [u32::MAX, 1], [0, u32::MAX], [u32::MAX, 1 << 20], [1 << 31, 3]]);
     let inputs: Vec<_> = cases.iter().map(|[bits, n]| TestInput::new(&[[*bits, *n, 0, 0]])).collect();
     for ([bits, n], output) in cases.iter().zip(functions(functions::BITS_BELOW, &inputs)) {
-        assert_eq!(u64::from(output.a[0]), u64::from(*bits) * u64::from(*n) >> 32, "{bits} below {n}");
+        assert_eq!(u64::from(output.a[0]), (u64::from(*bits) * u64::from(*n)) >> 32, "{bits} below {n}");
     }
 }
 
@@ -647,7 +647,7 @@ fn shadow_rays(random: &mut Random, distance: f32, blocker: Option<f32>) -> (usi
         .map(|_| {
             // Towards a point of the light, at cosines down to 0.05.
             let cosine = random.range(0.05, 1.0);
-            let across = Vec2::from_angle(random.range(0.0, 6.28)) * (1.0 - cosine * cosine).sqrt();
+            let across = Vec2::from_angle(random.range(0.0, TAU as f32)) * (1.0 - cosine * cosine).sqrt();
             let wi = u * across.x + v * across.y + normal * cosine;
             let at = corner + u * random.unit() + v * random.unit();
             let point = at + wi * distance;
