@@ -190,7 +190,7 @@ fn wrong_names_and_values_are_exit_code_2_and_say_what_is_right() {
     render("missing.glb", &["--max-depth", "1025"], "USAGE", "from 1 to 1024");
     render("missing.glb", &["--set", "film.exposure=bright"], "BAD_VALUE", "exposure");
     render("missing.glb", &["--set", "render.max_depth=0"], "BAD_VALUE", "max_depth");
-    render("missing.glb", &["--set", "candidates=none"], "BAD_VALUE", "candidates");
+    render("missing.glb", &["--set", "light_samples=none"], "BAD_VALUE", "light_samples");
     render("builtin:cornell", &["--spp", "4", "--accumulate", "no"], "BAD_VALUE", "--spp");
     assert!(folder.names().is_empty());
 }

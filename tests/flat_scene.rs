@@ -294,7 +294,7 @@ fn builtin_scenes_flatten_with_lights() {
         assert!(sees_something(&flat), "{}", info.name);
     }
     assert!(matches!(builtin::make("teapot"), Err(Error::Unknown { .. })));
-    assert!(matches!(builtin::make("many-lights"), Err(Error::Unknown { .. })));
+    assert!(matches!(builtin::make("many-lights"), Err(Error::BadValue { .. })));
 }
 
 /// Whether the ray through the middle of camera 0's picture hits a front.
