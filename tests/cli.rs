@@ -137,8 +137,34 @@ fn wrong_usage_is_exit_code_2_and_does_nothing() {
         let output = restir(&args.iter().map(String::as_str).collect::<Vec<_>>());
         assert_eq!(output.status.code(), Some(2), "{args:?}: {}", stderr(&output));
         assert!(output.stdout.is_empty() && !output.stderr.is_empty(), "{args:?}");
+        // Without any argument there is help.
+        if !args.is_empty() {
+            let stderr = stderr(&output);
+            assert!(stderr.starts_with("error[") && stderr.lines().count() == 1, "{args:?}: {stderr}");
+        }
     }
+    fail(&["render", "builtin:cornell"], 2, "USAGE", "--out <FILE> (try --help)");
+    fail(&["paint"], 2, "USAGE", "'paint'");
     assert!(folder.names().is_empty());
+}
+
+#[test]
+fn help_and_version_are_no_errors() {
+    assert!(succeed(&["--help"]).contains("Usage: restir <COMMAND>"));
+    assert!(succeed(&["render", "--help"]).contains("--max-depth"));
+    assert_eq!(succeed(&["--version"]).trim(), format!("restir {}", env!("CARGO_PKG_VERSION")));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_stderr_changes_no_exit_code() {
+    let code = |args: &[&str]| {
+        let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+        Command::new(env!("CARGO_BIN_EXE_restir")).args(args).stderr(full).output().unwrap().status.code()
+    };
+    assert_eq!(code(&["render"]), Some(2));
+    assert_eq!(code(&["info", "missing.glb"]), Some(1));
+    assert_eq!(code(&["info", "builtin:nothing"]), Some(2));
 }
 
 #[test]
@@ -157,7 +183,14 @@ fn wrong_names_and_values_are_exit_code_2_and_say_what_is_right() {
     render("builtin:cornell", &["--technique", "magic"], "UNKNOWN_NAME", "restir-di");
     render("builtin:cornell", &["--set", "colour=1"], "UNKNOWN_NAME", "colour");
     render("builtin:cornell", &["--set", "film.exposure=bright"], "BAD_VALUE", "exposure");
-    render("builtin:cornell", &["--max-depth", "0"], "BAD_VALUE", "max_depth");
+    render("builtin:many", &[], "UNKNOWN_NAME", "many-lights:N");
+    render("builtin:many-lights", &[], "BAD_VALUE", "many-lights:10000");
+    render("builtin:cornell", &["--max-depth", "0"], "USAGE", "max_depth");
+    // Told before the scene is looked for.
+    render("missing.glb", &["--max-depth", "1025"], "USAGE", "from 1 to 1024");
+    render("missing.glb", &["--set", "film.exposure=bright"], "BAD_VALUE", "exposure");
+    render("missing.glb", &["--set", "render.max_depth=0"], "BAD_VALUE", "max_depth");
+    render("missing.glb", &["--set", "light_samples=none"], "BAD_VALUE", "light_samples");
     render("builtin:cornell", &["--spp", "4", "--accumulate", "no"], "BAD_VALUE", "--spp");
     assert!(folder.names().is_empty());
 }
@@ -177,6 +210,26 @@ fn files_that_fail_are_exit_code_1_in_one_line_that_names_them() {
     let args = ["render", "builtin:cornell", "--environment", &missing, "--out", &out];
     fail(&args, 1, "IO", "missing.glb");
     assert_eq!(folder.names(), ["broken.glb"]);
+}
+
+#[test]
+fn names_may_be_as_long_as_the_file_system_allows() {
+    let folder = Folder::new("long");
+    let name = |length: usize| format!("{}.png", "a".repeat(length - 4));
+    let render =
+        |out: &str| ["render", "builtin:furnace", "--size", "8x8", "--frames", "1", "--out", out].map(String::from);
+    succeed(&render(&folder.path(&name(255))).each_ref().map(String::as_str));
+    fail(&render(&folder.path(&name(256))).each_ref().map(String::as_str), 1, "IO", "too long");
+    assert_eq!(folder.names(), [name(255)]);
+}
+
+#[test]
+fn lights_for_a_lit_scene_are_a_warning() {
+    let folder = Folder::new("lit");
+    let out = folder.path("a.png");
+    let args =
+        ["render", "builtin:furnace", "--lights", "5", "--size", "8x8", "--frames", "1", "--json", "--out", &out];
+    assert!(succeed_json(&args)["warnings"][0].as_str().unwrap().contains("--lights"));
 }
 
 #[test]

@@ -6,9 +6,13 @@
 
 mod support;
 
-use glam::{DVec3, Vec3};
-use restir::scene::{Camera, Environment, Instance, Material, Projection, PunctualKind, PunctualLight, Scene, shapes};
+use glam::{DVec3, Vec2, Vec3};
+use restir::scene::{
+    AlphaMode, Camera, Environment, Instance, Material, Projection, PunctualKind, PunctualLight, Scene, Texture,
+    TextureRef, Wrap, shapes,
+};
 use std::f64::consts::PI;
+use std::sync::Arc;
 use support::twins::Brdf;
 use support::*;
 
@@ -141,18 +145,67 @@ fn under_a_rectangle() {
         scene.materials.push(Material { emissive: radiance.as_vec3(), ..Material::default() });
         scene.meshes.push(shapes::parallelogram(corner.as_vec3(), u.as_vec3(), v.as_vec3(), 1));
         scene.instances.push(Instance { mesh: 1, transform: glam::Mat4::IDENTITY });
-        let n = 400;
-        let mut expected = DVec3::ZERO;
-        for i in 0..n {
-            for j in 0..n {
-                let p = corner + u * ((f64::from(i) + 0.5) / f64::from(n)) + v * ((f64::from(j) + 0.5) / f64::from(n));
-                let wi = p.normalize();
-                expected += scattered(&brdf, 0.5, wi) * radiance * (wi.y / p.length_squared());
-            }
-        }
-        expected *= u.length() * v.length() / f64::from(n * n);
+        let expected = from_rectangle(&brdf, 0.5, corner, u, v) * radiance;
         check(&scene, expected, &format!("rectangle, material {index}"));
     }
+}
+
+/// The integral of f cos over a downward rectangle, by the midpoint rule over its area.
+fn from_rectangle(brdf: &Brdf, angle: f64, corner: DVec3, u: DVec3, v: DVec3) -> DVec3 {
+    let n = 400;
+    let mut sum = DVec3::ZERO;
+    for i in 0..n {
+        for j in 0..n {
+            let p = corner + u * ((f64::from(i) + 0.5) / f64::from(n)) + v * ((f64::from(j) + 0.5) / f64::from(n));
+            let wi = p.normalize();
+            sum += scattered(brdf, angle, wi) * (wi.y / p.length_squared());
+        }
+    }
+    sum * u.length() * v.length() / f64::from(n * n)
+}
+
+/// The same light seen from a hundred metres and from two centimetres: it must not shadow itself, nor be lost. Not from
+/// a millimetre: a path leaves the plate 1/65536 m above it, and from there so near a light looks a percent larger.
+#[test]
+fn under_a_far_and_a_near_rectangle() {
+    let (material, brdf) = materials().remove(0);
+    for height in [100.0, 0.02] {
+        let mut scene = plate(material.clone(), 0.5);
+        scene.cameras[0].projection = Projection::Orthographic { half_height: 1e-6 };
+        let (corner, u, v) = (DVec3::new(-1.5, 1.0, -1.0) * height, DVec3::X * 2.0 * height, DVec3::Z * 2.0 * height);
+        scene.materials.push(Material { emissive: Vec3::splat(3.0), ..Material::default() });
+        scene.meshes.push(shapes::parallelogram(corner.as_vec3(), u.as_vec3(), v.as_vec3(), 1));
+        scene.instances.push(Instance { mesh: 1, transform: glam::Mat4::IDENTITY });
+        let expected = from_rectangle(&brdf, 0.5, corner, u, v) * 3.0;
+        check(&scene, expected, &format!("rectangle {height} m away"));
+    }
+}
+
+/// A light of which the mask has cut away one quarter is the other three, whichever way its paths are made.
+#[test]
+fn under_a_masked_rectangle() {
+    let (material, brdf) = materials().remove(0);
+    let mut scene = plate(material, 0.5);
+    let (corner, u, v) = (DVec3::new(-0.9, 0.9, -0.4), DVec3::X * 0.8, DVec3::Z * 0.8);
+    scene.textures.push(Texture {
+        name: "mask".into(),
+        width: 4,
+        height: 1,
+        pixels: Arc::new([255, 255, 255, 0].iter().flat_map(|alpha| [255, 255, 255, *alpha]).collect()),
+        wrap: [Wrap::Clamp; 2],
+        linear_filter: false,
+    });
+    let reference = TextureRef { texture: 0, uv_set: 0, offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE };
+    scene.materials.push(Material {
+        emissive: Vec3::splat(5.0),
+        alpha: AlphaMode::Mask(0.5),
+        base_color_texture: Some(reference),
+        ..Material::default()
+    });
+    scene.meshes.push(shapes::parallelogram(corner.as_vec3(), u.as_vec3(), v.as_vec3(), 1));
+    scene.instances.push(Instance { mesh: 1, transform: glam::Mat4::IDENTITY });
+    let expected = from_rectangle(&brdf, 0.5, corner, 0.75 * u, v) * 5.0;
+    check(&scene, expected, "masked rectangle");
 }
 
 #[test]

@@ -207,6 +207,7 @@ fn useless_triangles_are_dropped_and_counted() {
 fn an_empty_scene_is_a_point_that_nothing_hits() {
     let flat = flatten(&Scene::default());
     assert_eq!((flat.nodes.len(), flat.nodes[0].count, flat.triangles.len()), (1, 1, 1));
+    assert_eq!(flat.stats.triangles, 0, "the point is no triangle of the scene");
     assert!(flat.lights.is_empty() && flat.environment.is_none());
     assert_eq!(intersect_cpu(&flat, Vec3::Z, Vec3::NEG_Z, 9.0), None);
     assert!(flat.bounds.iter().all(|corner| corner.is_finite()));
@@ -293,7 +294,7 @@ fn builtin_scenes_flatten_with_lights() {
         assert!(sees_something(&flat), "{}", info.name);
     }
     assert!(matches!(builtin::make("teapot"), Err(Error::Unknown { .. })));
-    assert!(matches!(builtin::make("many-lights"), Err(Error::Unknown { .. })));
+    assert!(matches!(builtin::make("many-lights"), Err(Error::BadValue { .. })));
 }
 
 /// Whether the ray through the middle of camera 0's picture hits a front.

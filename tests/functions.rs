@@ -83,7 +83,7 @@ fn words_below_a_bound_are_exact() {
     cases.extend([[u32::MAX; 2], [u32::MAX, 1], [0, u32::MAX], [u32::MAX, 1 << 20], [1 << 31, 3]]);
     let inputs: Vec<_> = cases.iter().map(|[bits, n]| TestInput::new(&[[*bits, *n, 0, 0]])).collect();
     for ([bits, n], output) in cases.iter().zip(functions(functions::BITS_BELOW, &inputs)) {
-        assert_eq!(u64::from(output.a[0]), u64::from(*bits) * u64::from(*n) >> 32, "{bits} below {n}");
+        assert_eq!(u64::from(output.a[0]), (u64::from(*bits) * u64::from(*n)) >> 32, "{bits} below {n}");
     }
 }
 
@@ -625,6 +625,64 @@ fn emissive_triangles_send_radiance_from_their_front() {
                 assert_close(pdf.a()[1], f64::from(flat.lights[*light as usize].pmf) / area / geometry, 1e-6, position);
             }
         }
+    }
+}
+
+/// A rectangle light a metre wide, anywhere and turned any way, with a blocker in front of it if one is wanted: the
+/// fraction of shadow rays that arrive from points `distance` away (at least that far off the light's plane, times the
+/// cosine).
+fn shadow_rays(random: &mut Random, distance: f32, blocker: Option<f32>) -> (usize, usize) {
+    let centre = random.direction() * 16.0;
+    let turn = glam::Quat::from_rotation_arc(Vec3::Z, random.direction());
+    let (u, v, normal) = (turn * Vec3::X, turn * Vec3::Y, turn * Vec3::Z);
+    let corner = centre - 0.5 * (u + v);
+    let mut scene = floor(Material { emissive: Vec3::ONE, ..Material::default() });
+    scene.meshes = vec![shapes::parallelogram(corner, u, v, 0)];
+    if let Some(gap) = blocker {
+        scene.materials.push(Material { double_sided: true, ..Material::default() });
+        scene.meshes.push(shapes::parallelogram(corner + normal * gap - 0.5 * (u + v), 2.0 * u, 2.0 * v, 1));
+        scene.instances.push(Instance { mesh: 1, transform: glam::Mat4::IDENTITY });
+    }
+    let inputs: Vec<_> = (0..2000)
+        .map(|_| {
+            // Towards a point of the light, at cosines down to 0.05.
+            let cosine = random.range(0.05, 1.0);
+            let across = Vec2::from_angle(random.range(0.0, TAU as f32)) * (1.0 - cosine * cosine).sqrt();
+            let wi = u * across.x + v * across.y + normal * cosine;
+            let at = corner + u * random.unit() + v * random.unit();
+            let point = at + wi * distance;
+            // A surface that faces the light, more or less.
+            let facing = (random.direction() * 0.7 - wi).normalize();
+            let words = |x: Vec3| x.extend(0.0).to_array().map(f32::to_bits);
+            TestInput::new(&[words(point), words(facing), [random.next_u32() % 2, random.next_u32(), 0, 0]])
+        })
+        .collect();
+    let outputs = scene_functions(&flatten(&scene), scene_functions::SHADOW_RAY, &inputs);
+    let lit: Vec<_> = outputs.iter().filter(|o| o.a()[0] > 0.0).collect();
+    (lit.iter().filter(|o| o.b[0] == 1).count(), lit.len())
+}
+
+#[test]
+fn lights_do_not_shadow_themselves() {
+    let mut random = Random::new(19);
+    let mut tried = 0;
+    for exponent in -6..6 {
+        for _ in 0..4 {
+            let distance = 4f32.powi(exponent);
+            let (arrived, all) = shadow_rays(&mut random, distance, None);
+            assert_eq!(arrived, all, "from {distance} m");
+            tried += all;
+        }
+    }
+    assert!(tried > 80_000, "{tried}");
+}
+
+#[test]
+fn what_hangs_just_below_a_light_shadows_it() {
+    let mut random = Random::new(20);
+    for _ in 0..8 {
+        let (arrived, all) = shadow_rays(&mut random, 16.0, Some(0.0015));
+        assert!(all > 1500 && arrived == 0, "{arrived} of {all} pass through the blocker");
     }
 }
 

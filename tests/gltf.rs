@@ -327,6 +327,53 @@ fn json_files_with_data_uris_and_external_files() {
 }
 
 #[test]
+fn a_file_named_twice_is_read_once() {
+    let (file, buffer) = triangle().gltf("a.bin");
+    let mut json: Value = serde_json::from_slice(&file).unwrap();
+    let first = json["buffers"][0].clone();
+    json["buffers"] = json!([first, {"uri": "a.bin", "byteLength": 4}, {"uri": "b.bin", "byteLength": 4}, first]);
+    json["bufferViews"][0]["buffer"] = 3.into();
+    json["images"] = json!([{"uri": "c.png"}, {"uri": "d.png"}, {"uri": "c.png"}]);
+    json["textures"] = json!([{"source": 0}, {"source": 1}, {"source": 2}]);
+    let material = |index: u32| json!({"normalTexture": {"index": index}});
+    json["materials"] = json!([material(0), material(1), material(2)]);
+    let mut asked = Vec::new();
+    let scene = gltf::load_bytes("a.gltf", json.to_string().as_bytes(), &mut |path| {
+        asked.push(path.to_owned());
+        Ok(if path.ends_with("png") { png() } else { buffer.clone() })
+    });
+    let scene = scene.unwrap();
+    assert_eq!(asked, ["a.bin", "b.bin", "c.png", "d.png"]);
+    assert_eq!(scene.meshes[0].positions[1], Vec3::X);
+    let pixels: Vec<_> = scene.textures.iter().map(|texture| texture.pixels.as_ptr()).collect();
+    assert!(pixels[0] == pixels[2] && pixels[0] != pixels[1]);
+
+    // A view of a buffer ends where the buffer does, though its file be longer.
+    json["bufferViews"][0]["buffer"] = 1.into();
+    json["materials"] = json!([]);
+    let error = gltf::load_bytes("a.gltf", json.to_string().as_bytes(), &mut |_| Ok(buffer.clone())).unwrap_err();
+    assert!(error.to_string().contains("lie outside the 4 of its buffer"), "{error}");
+}
+
+#[test]
+fn scenes_need_no_nodes() {
+    let scene = load(br#"{"asset": {"version": "2.0"}, "scenes": [{}], "scene": 0}"#).unwrap();
+    assert!(scene.instances.is_empty());
+    let second = |mesh: Value| {
+        changed(triangle(), |json| {
+            json["scenes"] = json!([{"name": "empty"}, {"nodes": [0]}]);
+            json["scene"] = 1.into();
+            json["extras"] = json!({"kept": [1, 2.5]});
+            json["nodes"][0]["mesh"] = mesh;
+        })
+    };
+    assert_eq!(load(&second(0.into())).unwrap().instances.len(), 1);
+    let error = load(&second("first".into())).unwrap_err();
+    assert_eq!(error.code(), "BAD_FILE");
+    assert!(error.to_string().ends_with("(at JSON)"), "{error}");
+}
+
+#[test]
 fn files_are_found_beside_the_scene() {
     let folder = std::env::temp_dir().join(format!("restir-gltf-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();

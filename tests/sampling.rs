@@ -418,7 +418,7 @@ fn environment_samples_stay_in_their_texel() {
             eval_gpu(&gpu, &table::TESTS_SCENE_FUNCTIONS, Some(&scene), scene_functions::ENVIRONMENT_SAMPLE, &inputs);
         for (input, output) in inputs.iter().zip(outputs) {
             let [bits_x, bits_y, ..] = input.b.map(u64::from);
-            let bucket = (bits_x * u64::from(width) >> 32) + u64::from(width) * (bits_y * u64::from(height) >> 32);
+            let bucket = ((bits_x * u64::from(width)) >> 32) + u64::from(width) * ((bits_y * u64::from(height)) >> 32);
             let [threshold, alias, ..] = environment.alias[bucket as usize];
             let keep = f32::from_bits(input.a[0]) < f32::from_bits(threshold);
             let texel = if keep { bucket as u32 } else { alias };

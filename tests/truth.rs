@@ -168,12 +168,6 @@ fn planted_biases_are_caught() {
             "        if j == 0u {\n            mis_numerators[i] = share;",
         ),
         (
-            "temporal reuse with the random numbers of the initial candidates",
-            "techniques/restir-di/temporal.wgsl",
-            "frame.seed, STREAM_TEMPORAL)",
-            "frame.seed, STREAM_INITIAL)",
-        ),
-        (
             "the candidate count left out of the initial weights' mean",
             "techniques/common/resampling.wgsl",
             "(pdf * f32(candidate_count))",

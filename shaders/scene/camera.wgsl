@@ -33,7 +33,8 @@ fn direction_to_camera(camera: CameraView, position: vec3f) -> vec3f {
     if camera.orthographic == 1u {
         return -camera.forward;
     }
-    return normalize(camera.position - position);
+    let to_camera = camera.position - position;
+    return to_camera / max(length(to_camera), 1e-20);
 }
 
 // Where `camera` sees `position`, in pixels; (-1, -1) if it is behind.

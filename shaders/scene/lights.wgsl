@@ -52,7 +52,9 @@ fn light_sample_pdf(sample: LightSample) -> f32 {
     let pmf = lights[sample.light].pmf;
     let kind = lights[sample.light].kind;
     if kind == LIGHT_TRIANGLE {
-        return pmf / triangle_area(lights[sample.light].triangle);
+        let area = triangle_area(lights[sample.light].triangle);
+        // Also 0 where the area is 0 in f32, or the density too large for it.
+        return select(0.0, pmf / area, area > 1e-30);
     }
     if scene_has_environment && kind == LIGHT_ENVIRONMENT {
         return pmf * environment_point_pdf(sample.point);
@@ -92,6 +94,14 @@ fn cone_attenuation(light: u32, direction: vec3f) -> f32 {
     return square(clamp((cosine - lights[light].cos_outer) * scale, 0.0, 1.0));
 }
 
+// How far from the plane of a light triangle a shadow ray must end so that the light does not shadow itself: a few ulps
+// of the largest coordinate in the test of the ray against the triangle.
+fn shadow_margin(triangle: u32, position: vec3f) -> f32 {
+    let corners = max(max(abs(triangles[triangle].p0), abs(triangles[triangle].p1)), abs(triangles[triangle].p2));
+    let largest = max(corners, abs(position));
+    return 2e-6 * max(largest.x, max(largest.y, largest.z));
+}
+
 // What a light sample sends to a point, unshadowed. `previous` asks for the light as it was in the previous frame.
 fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> LightContribution {
     let light = sample.light;
@@ -103,15 +113,17 @@ fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> L
         let distance_2 = dot(to_light, to_light);
         let distance = sqrt(distance_2);
         let direction = to_light / max(distance, 1e-20);
-        var cosine = dot(normalize(triangle_normal(triangle)), -direction);
+        let scaled_normal = triangle_normal(triangle);
+        var cosine = dot(scaled_normal, -direction) / length(scaled_normal);
         if (triangles[triangle].flags & TRIANGLE_DOUBLE_SIDED) != 0u {
             cosine = abs(cosine);
         }
-        if cosine <= 0.0 || distance_2 <= 1e-12 {
+        // Not `cosine <= 0`, which is false for the 0 / 0 of a triangle without area.
+        if !(cosine > 0.0) || distance_2 <= 1e-12 {
             return LightContribution(direction, distance, vec3f(0.0), 0.0);
         }
-        // Cut short by a ten-thousandth, so that the light does not shadow itself.
-        return LightContribution(direction, distance * 0.9999, emitted_radiance(triangle, uv) * (cosine / distance_2),
+        let free = max(distance - shadow_margin(triangle, position) / cosine, 0.0);
+        return LightContribution(direction, free, emitted_radiance(triangle, uv) * (cosine / distance_2),
             distance_2 / cosine);
     }
     if scene_has_environment && kind == LIGHT_ENVIRONMENT {
@@ -127,6 +139,10 @@ fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> L
     let to_light = select(lights[light].position, lights[light].previous_position, previous) - position;
     let distance = length(to_light);
     let direction = to_light / max(distance, 1e-20);
+    if distance <= 1e-6 {
+        // No direction; and an infinite intensity times a BRDF of 0 would not be a number.
+        return LightContribution(direction, distance, vec3f(0.0), 0.0);
+    }
     var attenuation = distance_attenuation(light, distance);
     if kind == LIGHT_SPOT {
         attenuation *= cone_attenuation(light, direction);

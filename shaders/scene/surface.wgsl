@@ -142,7 +142,10 @@ fn surface_sample(surface: Surface, u: vec3f) -> vec3f {
         brdf_sample(surface.brdf, basis_to_local(surface.basis, surface.wo), u)));
 }
 
-// Whether nothing stands between the surface and `distance` along wi.
+// Whether nothing stands between the surface and the point at `distance` along wi. The ray starts a little above the
+// surface and still ends in that point: moved as a whole, it could run into a light before its end.
 fn is_visible(surface: Surface, wi: vec3f, distance: f32) -> bool {
-    return traverse(offset_origin(surface.position, surface.geometric_normal), wi, distance, true).triangle == NONE;
+    let origin = offset_origin(surface.position, surface.geometric_normal);
+    let direction = wi - (origin - surface.position) / max(distance, 1e-12);
+    return traverse(origin, direction, distance, true).triangle == NONE;
 }

@@ -14,6 +14,7 @@ const ENVIRONMENT_SAMPLE = 5u;
 const CAMERA = 6u;
 const OFFSET_ORIGIN = 7u;
 const SHADING_NORMAL = 8u;
+const SHADOW_RAY = 9u;
 
 fn evaluate(operation: u32, input: TestInput) -> TestOutput {
     let a = float(input.a);
@@ -59,6 +60,15 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
         // At the point b.xy of the triangle input.a.x.
         case SHADING_NORMAL: {
             return TestOutput(bits_3(shading_normal(input.a.x, b.xy, triangle_uvs(input.a.x, b.xy)), 0.0), vec4u(0u));
+        }
+        // Whether a surface at a, normal b, sees the light sample c.xy, and what that sends there.
+        case SHADOW_RAY: {
+            var surface: Surface;
+            surface.position = a.xyz;
+            surface.geometric_normal = b.xyz;
+            let light = light_contribution(LightSample(input.c.x, input.c.y), a.xyz, false);
+            let is_lit = is_visible(surface, light.direction, light.distance);
+            return TestOutput(bits_3(light.value, light.distance), vec4u(u32(is_lit), 0u, 0u, 0u));
         }
         case OFFSET_ORIGIN: { return TestOutput(bits_3(offset_origin(a.xyz, b.xyz), 0.0), vec4u(0u)); }
         default: { return TestOutput(vec4u(0u), vec4u(0u)); }

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use std::fs::{self, File, OpenOptions};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -30,25 +30,35 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<()> {
 pub fn check_writable(path: &Path) -> Result<()> {
     let io = |source| Error::Io { path: path.display().to_string(), source };
     if path.is_dir() {
-        return Err(io(std::io::ErrorKind::IsADirectory.into()));
+        return Err(io(ErrorKind::IsADirectory.into()));
+    }
+    // A name that is too long, say.
+    if let Err(error) = fs::metadata(path)
+        && error.kind() != ErrorKind::NotFound
+    {
+        return Err(io(error));
     }
     let (file, temporary) = create_beside(path).map_err(io)?;
     drop(file);
     fs::remove_file(temporary).map_err(io)
 }
 
-/// Creates a new file of an unused hidden name in the folder of `path`.
+/// Creates a new file of an unused hidden name in the folder of `path`. The name is short whatever that of `path`, which
+/// may be as long as the file system allows.
 fn create_beside(path: &Path) -> std::io::Result<(File, PathBuf)> {
     static COUNTER: AtomicU32 = AtomicU32::new(0);
-    let Some(name) = path.file_name() else {
-        return Err(std::io::ErrorKind::InvalidFilename.into());
-    };
-    let mut hidden = std::ffi::OsString::from(".");
-    hidden.push(name);
-    hidden.push(format!(".{}-{}.tmp", std::process::id(), COUNTER.fetch_add(1, Ordering::Relaxed)));
-    let temporary = path.with_file_name(hidden);
-    let file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
-    Ok((file, temporary))
+    if path.file_name().is_none() {
+        return Err(ErrorKind::InvalidFilename.into());
+    }
+    loop {
+        let number = COUNTER.fetch_add(1, Ordering::Relaxed);
+        let temporary = path.with_file_name(format!(".restir-{}-{number}.tmp", std::process::id()));
+        match OpenOptions::new().write(true).create_new(true).open(&temporary) {
+            // Left behind by another process of this number.
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            created => return Ok((created?, temporary)),
+        }
+    }
 }
 
 fn write_and_flush(mut file: File, bytes: &[u8]) -> std::io::Result<()> {

@@ -27,7 +27,7 @@ impl Scene {
         let scatter = scatter.min(MAX_SCATTERED);
         let [low, high] = self.corners();
         let extent = (high - low).max_element();
-        let candela = 0.5 * extent * extent / scatter as f32;
+        let candela = 2.0 * extent * extent / scatter as f32;
         let mut random = Random::new(seed ^ SEED);
         self.lights.extend((0..scatter).map(|_| PunctualLight {
             kind: PunctualKind::Point,

@@ -72,6 +72,7 @@ pub mod scene_functions {
     pub const CAMERA: u32 = 6;
     pub const OFFSET_ORIGIN: u32 = 7;
     pub const SHADING_NORMAL: u32 = 8;
+    pub const SHADOW_RAY: u32 = 9;
 }
 
 impl TestInput {

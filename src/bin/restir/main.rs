@@ -14,7 +14,7 @@ mod session;
 mod techniques;
 
 use clap::{Parser, Subcommand};
-use failure::Result;
+use failure::{Failure, Result};
 use std::process::ExitCode;
 
 /// ReSTIR on this machine's GPU, or on its CPU through a software Vulkan driver.
@@ -49,7 +49,7 @@ fn run(command: Command) -> Result<()> {
 }
 
 fn main() -> ExitCode {
-    match run(Cli::parse().command) {
+    match Cli::try_parse().map_err(Failure::Arguments).and_then(|cli| run(cli.command)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
     }

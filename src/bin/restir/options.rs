@@ -2,6 +2,8 @@
 
 use glam::UVec2;
 use restir::output::MAX_SIDE;
+use restir::params::{FilmParams, Params, RenderParams};
+use restir::techniques::TechniqueInfo;
 use restir::{Error, Result};
 
 /// `WIDTHxHEIGHT` in pixels, each 1 to [`MAX_SIDE`].
@@ -18,6 +20,23 @@ pub fn assignment(text: &str) -> Result<(String, String)> {
         Some((key, value)) if !key.is_empty() => Ok((key.to_owned(), value.to_owned())),
         _ => Err(Error::bad_value("set", format!("'{text}' is not key=value"))),
     }
+}
+
+/// Checks the value of a `--set` whose key is known; what knows every key is the renderer, which is made later.
+pub fn check_value(technique: &TechniqueInfo, key: &str, value: &str) -> Result<()> {
+    let (specs, name) = match key.split_once('.') {
+        Some(("render", name)) => (RenderParams::SPECS, name),
+        Some(("film", name)) => (FilmParams::SPECS, name),
+        _ => (technique.params, key),
+    };
+    specs.iter().find(|spec| spec.name == name).map_or(Ok(()), |spec| spec.parse(value).map(|_| ()))
+}
+
+/// A value of `render.max_depth`.
+pub fn max_depth(text: &str) -> Result<u32> {
+    let mut render = RenderParams::default();
+    render.set("max_depth", text)?;
+    Ok(render.max_depth)
 }
 
 /// A positive number of seconds.

@@ -20,10 +20,10 @@ pub fn json(value: &impl Serialize) -> Result<()> {
     text(&rendered)
 }
 
-/// Passes each warning on to stderr in one line.
+/// Passes each warning on to stderr in one line, if it can be written.
 pub fn warnings<'a>(warnings: impl IntoIterator<Item = &'a String>) {
     for warning in warnings {
-        eprintln!("warning: {warning}");
+        let _ = writeln!(std::io::stderr(), "warning: {warning}");
     }
 }
 

@@ -40,7 +40,11 @@ pub fn light(scene: &mut Scene, lighting: &Lighting, seed: u32) -> Result<()> {
             scene.warnings.push(format!("{file}: {clamped} values were not within 0 and {most:e} and were clamped"));
         }
     }
+    let own = scene.lights.len();
     scene.ensure_light(lighting.lights.unwrap_or(0), seed.into());
+    if lighting.lights.is_some() && scene.lights.len() == own {
+        scene.warnings.push("--lights does nothing here: the scene has light of its own".into());
+    }
     Ok(())
 }
 

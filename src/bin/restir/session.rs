@@ -27,7 +27,7 @@ pub struct Options {
     #[arg(long, value_name = "INDEX|NAME")]
     pub camera: Option<String>,
     /// Longest path in scattering events: 1 is direct light only. Lights seen directly are always drawn.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = options::max_depth)]
     pub max_depth: Option<u32>,
     #[command(flatten)]
     pub lighting: scene::Lighting,
@@ -66,8 +66,11 @@ pub struct PassReport {
 impl Session {
     /// Loads the scene and prepares the device. Warnings go to stderr.
     pub fn open(name: &str, options: &Options) -> Result<Session> {
-        // A wrong name is told before long work.
-        techniques::find(&options.technique).map_err(Failure::from_option)?;
+        // A wrong name or value is told before long work.
+        let technique = techniques::find(&options.technique).map_err(Failure::from_option)?;
+        for (key, value) in &options.set {
+            options::check_value(technique, key, value).map_err(Failure::from_option)?;
+        }
         let mut scene = scene::load(name)?;
         scene::light(&mut scene, &options.lighting, options.seed)?;
         let flat = scene::flatten(&scene)?;

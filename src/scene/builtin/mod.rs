@@ -23,6 +23,13 @@ pub struct BuiltinInfo {
     pub example: &'static str,
 }
 
+impl BuiltinInfo {
+    /// The name, with `:N` where it takes a number.
+    fn form(&self) -> String {
+        if self.example == self.name { self.name.to_owned() } else { format!("{}:N", self.name) }
+    }
+}
+
 /// Every built-in scene.
 pub const ALL: &[BuiltinInfo] = &[
     BuiltinInfo {
@@ -76,11 +83,14 @@ pub fn make(name: &str) -> Result<Scene> {
         "cornell-64" => Ok(cornell::cornell_64()),
         "furnace" => Ok(furnace::furnace()),
         "veach-mis" => Ok(veach_mis::veach_mis()),
+        "many-lights" => {
+            Err(Error::bad_value("many-lights:N", "the number of lights is missing, as in many-lights:10000"))
+        }
         "glossy-spheres" => Ok(glossy_spheres::glossy_spheres()),
         _ => Err(Error::Unknown {
             kind: "built-in scene",
             name: name.to_owned(),
-            known: ALL.iter().map(|info| info.example).collect::<Vec<_>>().join(", "),
+            known: ALL.iter().map(BuiltinInfo::form).collect::<Vec<_>>().join(", "),
         }),
     }
 }

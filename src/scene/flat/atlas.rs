@@ -12,8 +12,8 @@ const MAX_SIDE: u32 = 8192;
 const MAX_LAYERS: u32 = 256;
 const MIN_SIDE: u32 = 4;
 const TEXEL_BYTES: usize = 4;
-/// Most bytes of all layers: far from what the address space can hold.
-const MAX_BYTES: u64 = if cfg!(target_pointer_width = "32") { 1 << 30 } else { 1 << 33 };
+/// Most bytes of all layers: what a small device and a 32-bit address space can hold.
+const MAX_BYTES: u64 = 1 << 30;
 
 /// Where a texture lies in the atlas.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -50,21 +50,8 @@ pub(super) fn pack(scene: &Scene, warnings: &mut Vec<String>) -> Result<(Atlas, 
         };
         picture_of_texture.push(index);
     }
-    let largest = pictures.iter().map(|p| p.width.max(p.height)).max().unwrap_or(0);
-    let mut size = largest.next_power_of_two().max(MIN_SIDE);
-    let (mut places, mut layers) = shelves(&pictures, size);
-    while layers > MAX_LAYERS && size < MAX_SIDE {
-        size *= 2;
-        (places, layers) = shelves(&pictures, size);
-    }
-    let limit = |wanted, had, unit| Err(Error::Limit { what: "the texture atlas".into(), wanted, had, unit });
-    if layers > MAX_LAYERS {
-        return limit(u64::from(layers), u64::from(MAX_LAYERS), "layers");
-    }
-    let bytes = u64::from(size).pow(2) * u64::from(layers) * TEXEL_BYTES as u64;
-    if bytes > MAX_BYTES {
-        return limit(bytes, MAX_BYTES, "bytes");
-    }
+    let (size, layers, places) = lay_out(&pictures);
+    check_size(size, layers)?;
     let texels = draw(&pictures, &places, size, layers);
     let rectangles = picture_of_texture.into_iter().filter_map(|index| places.get(index).copied()).collect();
     Ok((Atlas { size, layers, texels }, rectangles))
@@ -109,6 +96,45 @@ fn halve(picture: &Picture) -> Picture<'static> {
         }
     }
     Picture { width, height, pixels: Cow::Owned(pixels) }
+}
+
+/// Size of a layer, number of layers and places: those with the fewest texels, from layers that just hold the largest
+/// picture, doubled and doubled again, to the largest layers.
+fn lay_out(pictures: &[Picture]) -> (u32, u32, Vec<Rectangle>) {
+    let largest = pictures.iter().map(|p| p.width.max(p.height)).max().unwrap_or(0);
+    let mut size = largest.next_multiple_of(MIN_SIDE).max(MIN_SIDE);
+    let mut best = layers_of(pictures, size);
+    while size < MAX_SIDE && best.1 > 1 {
+        size = (2 * size).min(MAX_SIDE);
+        let larger = layers_of(pictures, size);
+        let better = texels_of(larger.0, larger.1) < texels_of(best.0, best.1);
+        if better || best.1 > MAX_LAYERS {
+            best = larger;
+        }
+    }
+    best
+}
+
+fn layers_of(pictures: &[Picture], size: u32) -> (u32, u32, Vec<Rectangle>) {
+    let (places, layers) = shelves(pictures, size);
+    (size, layers, places)
+}
+
+/// Told before the layers are allocated.
+fn check_size(size: u32, layers: u32) -> Result<()> {
+    let limit = |wanted, had, unit| Err(Error::Limit { what: "the texture atlas".into(), wanted, had, unit });
+    let bytes = texels_of(size, layers) * TEXEL_BYTES as u64;
+    if layers > MAX_LAYERS {
+        return limit(u64::from(layers), u64::from(MAX_LAYERS), "layers");
+    }
+    if bytes > MAX_BYTES {
+        return limit(bytes, MAX_BYTES, "bytes");
+    }
+    Ok(())
+}
+
+fn texels_of(size: u32, layers: u32) -> u64 {
+    u64::from(size).pow(2) * u64::from(layers)
 }
 
 /// Rows ("shelves") from the top, tallest pictures first. Returns a place for each picture, and the number of layers.
@@ -182,7 +208,9 @@ mod tests {
         let textures: Vec<Texture> =
             (0..200).map(|i| texture(1 + random.next_u32() % 60, 1 + random.next_u32() % 60, i as u8)).collect();
         let (atlas, rectangles, _) = packed(textures.clone()).unwrap();
-        assert_eq!(atlas.size, 64);
+        assert!(atlas.size.is_multiple_of(4) && atlas.size >= 60, "{}", atlas.size);
+        let filled: usize = textures.iter().map(|texture| texture.pixels.len()).sum();
+        assert!(filled * 5 > atlas.texels.len() * 3, "{filled} of {} bytes are used", atlas.texels.len());
         for (texture, place) in textures.iter().zip(&rectangles) {
             assert_eq!((texture.width, texture.height), (place.width, place.height));
             for y in place.y..place.y + place.height {
@@ -209,9 +237,26 @@ mod tests {
     }
 
     #[test]
+    fn layers_are_no_larger_than_they_must_be() {
+        let picture = |side| Picture { width: side, height: side, pixels: Cow::Borrowed(&[]) };
+        let laid_out = |count: u32, side| {
+            let pictures: Vec<Picture> = (0..count).map(|_| picture(side)).collect();
+            let (size, layers, _) = lay_out(&pictures);
+            (size, layers, check_size(size, layers).is_ok())
+        };
+        assert_eq!(laid_out(1, 4097), (4100, 1, true));
+        assert_eq!(laid_out(15, 4097), (4100, 15, true));
+        assert_eq!(laid_out(31, 4097), (4100, 31, false));
+        assert_eq!(laid_out(16, 4096), (4096, 16, true));
+        assert_eq!(laid_out(17, 4096), (4096, 17, false));
+        assert_eq!(laid_out(1, 8192), (8192, 1, true));
+        assert_eq!(laid_out(257, 8192), (8192, 257, false));
+    }
+
+    #[test]
     fn too_large_is_halved_with_a_warning() {
         let (atlas, rectangles, warnings) = packed(vec![texture(8195, 1, 7)]).unwrap();
-        assert_eq!((atlas.size, rectangles[0].width, rectangles[0].height), (8192, 4098, 1));
+        assert_eq!((atlas.size, rectangles[0].width, rectangles[0].height), (4100, 4098, 1));
         assert_eq!(warnings.len(), 1);
         assert_eq!(atlas.texels[0], 7);
     }

@@ -2,6 +2,7 @@
 
 mod atlas;
 mod bytes;
+mod framing;
 mod lights;
 mod materials;
 mod triangles;
@@ -111,6 +112,7 @@ impl FlatScene {
 
         progress(0.3, "building the BVH");
         let mut unordered = baked.triangles;
+        let triangle_count = unordered.len() as u64;
         if unordered.is_empty() {
             unordered.push(POINT);
         }
@@ -137,7 +139,7 @@ impl FlatScene {
         let bounds = bounds(&nodes, scene);
         let mut flat = FlatScene {
             name: scene.name.clone(),
-            cameras: cameras(scene, bounds, &mut warnings),
+            cameras: Vec::new(),
             bounds,
             stats: SceneStats::default(),
             nodes,
@@ -148,10 +150,12 @@ impl FlatScene {
             motions: scene.motions.clone(),
             atlas,
             environment,
-            warnings,
+            warnings: Vec::new(),
         };
+        flat.cameras = cameras(scene, &flat, &mut warnings);
+        flat.warnings = warnings;
         flat.stats = SceneStats {
-            triangles: flat.triangles.len() as u64,
+            triangles: triangle_count,
             dropped_triangles: baked.dropped,
             instances: scene.instances.len() as u64,
             materials: flat.materials.len() as u64,
@@ -210,8 +214,8 @@ fn bounds(nodes: &[BvhNode], scene: &Scene) -> [Vec3; 2] {
         .fold(root, |[min, max], position| [min.min(position), max.max(position)])
 }
 
-/// The scene's usable cameras, or one that frames its bounds from the front and a little above.
-fn cameras(scene: &Scene, bounds: [Vec3; 2], warnings: &mut Vec<String>) -> Vec<Camera> {
+/// The scene's usable cameras, or one that shows it from inside or outside.
+fn cameras(scene: &Scene, flat: &FlatScene, warnings: &mut Vec<String>) -> Vec<Camera> {
     let usable = |camera: &&Camera| {
         let extent = match camera.projection {
             Projection::Perspective { vertical_fov } => vertical_fov,
@@ -226,16 +230,7 @@ fn cameras(scene: &Scene, bounds: [Vec3; 2], warnings: &mut Vec<String>) -> Vec<
         warnings.push(format!("{unusable} cameras that cannot project were left out"));
     }
     if cameras.is_empty() {
-        cameras.push(framing_camera(bounds));
+        cameras.push(framing::camera(flat));
     }
     cameras
-}
-
-fn framing_camera([min, max]: [Vec3; 2]) -> Camera {
-    const VERTICAL_FOV: f32 = std::f32::consts::FRAC_PI_4;
-    let center = 0.5 * (min + max);
-    let radius = (0.5 * (max - min).length()).max(1e-3);
-    let distance = radius / (0.5 * VERTICAL_FOV).sin();
-    let from = Vec3::new(0.3, 0.25, 1.0).normalize();
-    Camera::look_at("framing", center + from * distance, center, VERTICAL_FOV)
 }

@@ -84,6 +84,8 @@ fn check_triangle(scene: &FlatScene, index: usize, triangle: &Triangle) -> Resul
 
 fn check_material(atlas: &Atlas, material: &Material) -> Result<(), &'static str> {
     must(material.base_color.is_finite() && material.emissive.is_finite(), "a colour that is not finite")?;
+    let factors = [material.metallic, material.roughness, material.normal_scale, material.alpha_cutoff];
+    must(factors.iter().all(|f| f.is_finite()), "a factor that is not finite")?;
     let slots = [
         &material.base_color_texture,
         &material.metallic_roughness_texture,
@@ -94,6 +96,8 @@ fn check_material(atlas: &Atlas, material: &Material) -> Result<(), &'static str
     let sound = |slot: &TextureSlot| {
         slot.width == 0
             || (slot.height > 0
+                && slot.row_u.is_finite()
+                && slot.row_v.is_finite()
                 && slot.layer < atlas.layers
                 && inside(slot.x, slot.width)
                 && inside(slot.y, slot.height))

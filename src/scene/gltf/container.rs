@@ -3,6 +3,7 @@
 use super::{SUPPORTED_EXTENSIONS, tidy};
 use crate::error::{Error, Result};
 use gltf::json::{Root, validation::Checked};
+use serde_json::Value;
 
 /// Most JSON objects in a file: each may take a kilobyte once parsed.
 const MAX_JSON_OBJECTS: u64 = 1 << 20;
@@ -60,9 +61,22 @@ impl Document<'_> {
 pub(super) fn parse<'a>(file: &'a str, bytes: &'a [u8]) -> Result<Document<'a>> {
     let (json, binary) = if bytes.starts_with(b"glTF") { split_glb(file, bytes)? } else { (bytes, None) };
     check_json_size(file, json)?;
-    check_header(file, json)?;
-    let root = serde_json::from_slice(json).map_err(|error| json_error(file, &error))?;
-    Ok(Document { file, root, binary })
+    let header = check_header(file, json)?;
+    let root = if header.scenes.iter().all(|scene| scene.nodes.is_some()) {
+        serde_json::from_slice(json)
+    } else {
+        serde_json::from_slice(json).and_then(|json| serde_json::from_value(with_scene_nodes(json)))
+    };
+    Ok(Document { file, root: root.map_err(|error| json_error(file, &error))?, binary })
+}
+
+/// Gives each scene its `nodes`, which the specification lets it leave out, but the JSON crate does not.
+fn with_scene_nodes(mut json: Value) -> Value {
+    let scenes = json.get_mut("scenes").and_then(Value::as_array_mut);
+    for scene in scenes.into_iter().flatten().filter_map(Value::as_object_mut) {
+        scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
+    }
+    json
 }
 
 /// Little-endian u32 at `offset`.
@@ -139,6 +153,14 @@ struct Header {
     asset: Asset,
     #[serde(default, rename = "extensionsRequired")]
     extensions_required: Vec<String>,
+    #[serde(default)]
+    scenes: Vec<SceneHeader>,
+}
+
+/// One of `scenes` of [`Header`].
+#[derive(serde::Deserialize)]
+struct SceneHeader {
+    nodes: Option<serde::de::IgnoredAny>,
 }
 
 /// `asset` of [`Header`].
@@ -150,7 +172,7 @@ struct Asset {
 }
 
 /// Refuses other versions than 2.0 and extensions that are required but not supported.
-fn check_header(file: &str, json: &[u8]) -> Result<()> {
+fn check_header(file: &str, json: &[u8]) -> Result<Header> {
     let header: Header = serde_json::from_slice(json).map_err(|error| json_error(file, &error))?;
     let unsupported = |what: String| Err(Error::Unsupported { file: file.into(), what });
     // A later minor version is readable unless it says otherwise in minVersion (specification, section 3.2).
@@ -164,13 +186,17 @@ fn check_header(file: &str, json: &[u8]) -> Result<()> {
     }
     match header.extensions_required.iter().find(|name| !SUPPORTED_EXTENSIONS.contains(&name.as_str())) {
         Some(name) => unsupported(format!("required extension {}", tidy(name))),
-        None => Ok(()),
+        None => Ok(header),
     }
 }
 
-/// A JSON error with its line and column as the place.
+/// A JSON error with its line and column, where they are known, as the place.
 fn json_error(file: &str, error: &serde_json::Error) -> Error {
     let text = error.to_string();
     let what = text.rsplit_once(" at line ").map_or(text.as_str(), |(what, _)| what);
-    Error::bad_file(file, format!("JSON line {} column {}", error.line(), error.column()), tidy(what))
+    let place = match error.line() {
+        0 => "JSON".to_owned(),
+        line => format!("JSON line {line} column {}", error.column()),
+    };
+    Error::bad_file(file, place, tidy(what))
 }

@@ -6,6 +6,7 @@ use super::{MAX_IMAGE_BYTES, MAX_IMAGE_SIDE, Resolve, tidy, uri};
 use crate::error::{Error, Result};
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::io::Cursor;
 use std::sync::Arc;
 
@@ -23,8 +24,10 @@ pub(super) struct Image {
     pub pixels: Arc<Vec<u8>>,
 }
 
-/// The images decoded so far.
+/// The images decoded so far, each file once.
 pub(super) struct Images {
+    /// Of each image, the first one with the same bytes.
+    first: Vec<usize>,
     decoded: Vec<Option<Image>>,
     bytes: u64,
 }
@@ -32,7 +35,14 @@ pub(super) struct Images {
 impl Images {
     /// Nothing decoded yet.
     pub fn new(document: &Document) -> Self {
-        Images { decoded: vec![None; document.root.images.len()], bytes: 0 }
+        let images = &document.root.images;
+        let mut known = HashMap::new();
+        let first = images.iter().enumerate().map(|(index, image)| {
+            // A buffer view counts where there is one, as in `get`.
+            let view = image.buffer_view.map(|view| view.value());
+            *known.entry((view, image.uri.as_deref().filter(|_| view.is_none()))).or_insert(index)
+        });
+        Images { first: first.collect(), decoded: vec![None; images.len()], bytes: 0 }
     }
 
     /// Image `index`, decoded at its first use.
@@ -45,6 +55,7 @@ impl Images {
         place: &str,
     ) -> Result<Image> {
         let image = document.at(&document.root.images, index, "images", place)?;
+        let index = self.first.get(index).copied().unwrap_or(index);
         if let Some(Some(decoded)) = self.decoded.get(index) {
             return Ok(decoded.clone());
         }

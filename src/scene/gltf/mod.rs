@@ -34,7 +34,7 @@ pub const MAX_GEOMETRY_BYTES: u64 = 2 << 30;
 /// Most bytes that all buffers of a file may have together; also the most for one file on disk.
 pub const MAX_BUFFER_BYTES: u64 = 2 << 30;
 /// Most bytes that all decoded images of a file may have together.
-pub const MAX_IMAGE_BYTES: u64 = 2 << 30;
+pub const MAX_IMAGE_BYTES: u64 = 1 << 30;
 /// Longest side of an image in texels.
 pub const MAX_IMAGE_SIDE: u32 = 16_384;
 /// Most warnings that are kept one by one.
