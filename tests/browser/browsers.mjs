@@ -20,8 +20,9 @@ const chromiumSwitches = [
 ];
 
 const launchers = {
+  // A copy of the switches, for puppeteer takes --enable-features out of the list it is given.
   chromium: (profile) =>
-    puppeteer.launch({ browser: 'chrome', executablePath: '/usr/bin/chromium', headless: true, userDataDir: profile, args: chromiumSwitches }),
+    puppeteer.launch({ browser: 'chrome', executablePath: '/usr/bin/chromium', headless: true, userDataDir: profile, args: [...chromiumSwitches] }),
   // WebGPU on lavapipe: the Vulkan driver comes from the environment that npm test sets.
   firefox: (profile) =>
     puppeteer.launch({

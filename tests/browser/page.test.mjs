@@ -1,7 +1,6 @@
 // The page in a real browser: it boots, shows the picture that the command line renders, and says what is wrong.
 import { strict as assert } from 'node:assert';
 import { after, before, test } from 'node:test';
-import { browserName } from './browsers.mjs';
 import { renderNatively } from './native.mjs';
 import { assertNoProblems, contrast, openPage, openSite, readDisplay, waitForFrames, waitForMessage } from './pages.mjs';
 
@@ -19,27 +18,6 @@ async function withPage(query, work, prepare) {
     await page.close();
   }
 }
-
-/** Milliseconds from navigation to the first picture, in a browser just started: nothing is cached. */
-async function firstPicture() {
-  const fresh = await openSite();
-  try {
-    const { page, problems } = await openPage(fresh, '');
-    await waitForFrames(page, 1);
-    assertNoProblems(problems);
-    return await page.evaluate(() => performance.getEntriesByName('picture')[0].startTime);
-  } finally {
-    await fresh.close();
-  }
-}
-
-test('shows a first picture of cornell within 5 s of navigation', { skip: browserName !== 'chromium' }, async (context) => {
-  const times = [];
-  // Other work on the machine only adds to the time, so the best of three is the nearest to the truth.
-  while (times.length < 3 && !(times.at(-1) < 5000)) times.push(await firstPicture());
-  context.diagnostic(`first picture after ${times.map((time) => time.toFixed(0)).join(', ')} ms`);
-  assert.ok(times.at(-1) < 5000, `first picture after ${times.map((time) => time.toFixed(0)).join(', ')} ms`);
-});
 
 // Two drivers never agree in every bit: a ray that grazes an edge takes another path. Nearly all values must agree to
 // within a rounding step of the display, and what differs must not shift the mean. Measured: Firefox, whose driver is
