@@ -19,6 +19,11 @@ use std::sync::{Arc, Mutex};
 /// A pass and the scene features it was specialised for.
 type PipelineKey = (&'static str, SceneFeatures);
 
+/// A pass that is not specialised has one pipeline for all scenes.
+fn pipeline_key(shader: &'static Shader, features: SceneFeatures) -> PipelineKey {
+    (shader.id, if shader.overrides.is_empty() { SceneFeatures::ALL } else { features })
+}
+
 /// How to choose a device.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct GpuOptions {
@@ -146,13 +151,17 @@ impl Gpu {
 
     /// The compute pipeline of a pass for scenes that have `features`, made on first use.
     pub fn pipeline(&self, shader: &'static Shader, features: SceneFeatures) -> Pipeline {
-        // A pass that is not specialised has one pipeline for all scenes.
-        let features = if shader.overrides.is_empty() { SceneFeatures::ALL } else { features };
-        let make = || shader.compute_pipeline(&self.device, &self.shader_source(shader), features);
+        let key = pipeline_key(shader, features);
+        let make = || shader.compute_pipeline(&self.device, &self.shader_source(shader), key.1);
         match self.pipelines.lock() {
-            Ok(mut pipelines) => pipelines.entry((shader.id, features)).or_insert_with(make).clone(),
+            Ok(mut pipelines) => pipelines.entry(key).or_insert_with(make).clone(),
             Err(_) => make(),
         }
+    }
+
+    /// Whether [`Gpu::pipeline`] has it already.
+    pub fn has_pipeline(&self, shader: &'static Shader, features: SceneFeatures) -> bool {
+        self.pipelines.lock().is_ok_and(|pipelines| pipelines.contains_key(&pipeline_key(shader, features)))
     }
 
     /// A pass's text: as edited while the program runs (native debug builds), or as built.

@@ -86,8 +86,7 @@ impl<'a> Recorder<'a> {
         if let Some(timer) = timer.as_mut() {
             timer.clear();
         }
-        let encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
-        Recorder { gpu, encoder, timer, shared: Vec::new(), features: SceneFeatures::ALL }
+        Recorder { gpu, encoder: frame_encoder(gpu), timer, shared: Vec::new(), features: SceneFeatures::ALL }
     }
 
     /// Binds a resource for every later pass that asks for it by name.
@@ -101,6 +100,12 @@ impl<'a> Recorder<'a> {
         Pass { recorder: self, shader, bound }
     }
 
+    /// Submits what is recorded so far; the device runs it while this thread goes on.
+    fn flush(&mut self) {
+        let recorded = std::mem::replace(&mut self.encoder, frame_encoder(self.gpu));
+        self.gpu.queue.submit([recorded.finish()]);
+    }
+
     /// Ends the frame and submits it.
     pub fn submit(mut self) {
         if let Some(timer) = self.timer
@@ -110,6 +115,10 @@ impl<'a> Recorder<'a> {
         }
         self.gpu.queue.submit([self.encoder.finish()]);
     }
+}
+
+fn frame_encoder(gpu: &Gpu) -> wgpu::CommandEncoder {
+    gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") })
 }
 
 /// One pass being described.
@@ -142,6 +151,10 @@ impl<'r> Pass<'r, '_> {
     /// `SHADER` if something the shader needs was not bound.
     pub fn dispatch(self, workgroups: [u32; 3]) -> Result<()> {
         let Pass { recorder, shader, bound } = self;
+        // Compiling may take a second: in a first frame the passes before run meanwhile.
+        if !recorder.gpu.has_pipeline(shader, recorder.features) {
+            recorder.flush();
+        }
         let pipeline = recorder.gpu.pipeline(shader, recorder.features);
         let groups = shader.bind_groups(recorder.gpu, &pipeline.groups, &bound)?;
         let timestamp_writes = recorder.timer.as_mut().and_then(|timer| {
