@@ -1,4 +1,4 @@
-// Starts the browser under test, as the toolchain notes found it to work without a GPU.
+// Starts the browser under test with the switches that work without a GPU.
 import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
