@@ -7,7 +7,8 @@ use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
 use crate::scene::FlatScene;
 use crate::scene::flat::{FlatInstance, levels};
-use crate::scene::gpu_types::{BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK};
+use crate::scene::bvh::wide;
+use crate::scene::gpu_types::{Instance, LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK, WideNode};
 use glam::{Mat4, Quat, Vec3, Vec4};
 
 /// Triangles in the first of the two buffers: 128 MiB, what every WebGPU device can bind. As in `shaders/scene/data.wgsl`.
@@ -25,6 +26,8 @@ pub struct GpuScene {
     instances: DataTexture,
     /// Object to world of each instance in the frame that is uploaded.
     transforms: Vec<Mat4>,
+    /// Index in `nodes` of the root of each mesh's bottom level.
+    roots: Vec<u32>,
     /// Index in `nodes` of the root of everything.
     top_level: u32,
     atlas: wgpu::TextureView,
@@ -74,17 +77,20 @@ impl GpuScene {
         let first = scene.first_punctual as usize;
         let punctual: Vec<Light> =
             scene.lights.iter().skip(first).filter(|l| l.kind != LIGHT_ENVIRONMENT).copied().collect();
+        let forest = Forest::new(scene)?;
+        let records = instance_records(scene, &forest.roots, &transforms, &transforms);
         Ok(GpuScene {
-            nodes: gpu.storage_of("nodes", &scene.nodes)?,
+            nodes: gpu.storage_of("the nodes of the BVH", &forest.nodes)?,
             triangles: [
                 gpu.storage_of("triangles", first_triangles)?,
                 gpu.storage_of("the triangles after the first 2796202", if rest.is_empty() { &point } else { rest })?,
             ],
             attributes: DataTexture::new(gpu, "attributes", &scene.attributes)?,
             materials: DataTexture::new(gpu, "materials", &scene.materials)?,
-            instances: DataTexture::new(gpu, "instances", &instance_records(scene, &transforms, &transforms))?,
+            instances: DataTexture::new(gpu, "instances", &records)?,
             transforms,
-            top_level: scene.root(),
+            roots: forest.roots,
+            top_level: forest.top_level,
             lights: if scene.lights.is_empty() {
                 gpu.storage("lights", std::mem::size_of::<Light>() as u64)?
             } else {
@@ -152,10 +158,10 @@ impl GpuScene {
                 levels::transformed_box(transform, [root.min, root.max])
             })
             .collect();
-        let nodes = levels::top_level(&boxes, self.top_level);
-        let offset = u64::from(self.top_level) * size_of::<BvhNode>() as u64;
+        let nodes = wide::collapse(&levels::top_level(&boxes, 0), 0, self.top_level, 0).nodes;
+        let offset = u64::from(self.top_level) * size_of::<WideNode>() as u64;
         gpu.queue.write_buffer(&self.nodes, offset, bytemuck::cast_slice(&nodes));
-        self.instances.write(gpu, 0, &instance_records(scene, transforms, &self.transforms));
+        self.instances.write(gpu, 0, &instance_records(scene, &self.roots, transforms, &self.transforms));
         self.transforms = transforms.to_vec();
     }
 
@@ -200,12 +206,50 @@ fn features(scene: &FlatScene) -> SceneFeatures {
     }
 }
 
-fn instance_records(scene: &FlatScene, transforms: &[Mat4], previous: &[Mat4]) -> Vec<Instance> {
+/// The trees of a scene as shaders walk them, one after another; last the top level, with room to be rebuilt in.
+struct Forest {
+    nodes: Vec<WideNode>,
+    /// Index of the root of each mesh's bottom level.
+    roots: Vec<u32>,
+    /// Index of the root of everything.
+    top_level: u32,
+}
+
+impl Forest {
+    fn new(scene: &FlatScene) -> Result<Self> {
+        let limit = |what: &str, wanted: u32, had: u32| {
+            let what = format!("the stack for {what}");
+            if wanted > had {
+                return Err(Error::Limit { what, wanted: wanted.into(), had: had.into(), unit: "entries" });
+            }
+            Ok(())
+        };
+        let mut forest = Forest { nodes: Vec::new(), roots: Vec::new(), top_level: 0 };
+        for mesh in &scene.meshes {
+            let root = forest.nodes.len() as u32;
+            forest.roots.push(root);
+            let tree = wide::collapse(&scene.nodes, mesh.root as usize, root, 0);
+            limit("the BVH of a mesh", tree.stack, wide::MAX_STACK)?;
+            forest.nodes.extend(tree.nodes);
+        }
+        if scene.has_top_level() {
+            forest.top_level = forest.nodes.len() as u32;
+            let top = wide::collapse(&scene.nodes, scene.root() as usize, forest.top_level, 0);
+            limit("the BVH of the instances", top.stack, wide::MAX_TOP_STACK)?;
+            let room = wide::capacity(scene.nodes.len() - scene.root() as usize);
+            forest.nodes.extend(top.nodes);
+            forest.nodes.resize(forest.top_level as usize + room, bytemuck::Zeroable::zeroed());
+        }
+        Ok(forest)
+    }
+}
+
+fn instance_records(scene: &FlatScene, roots: &[u32], transforms: &[Mat4], previous: &[Mat4]) -> Vec<Instance> {
     let record = |((instance, &transform), &previous): ((&FlatInstance, &Mat4), &Mat4)| Instance {
         to_object: if levels::is_invertible(transform) { levels::rows(transform.inverse()) } else { [Vec4::ZERO; 3] },
         to_world: levels::rows(transform),
         previous_to_world: levels::rows(previous),
-        root: scene.meshes[instance.mesh as usize].root,
+        root: roots[instance.mesh as usize],
         first_light: instance.first_light,
         previous_triangles: 0,
         padding: 0,

@@ -1,4 +1,6 @@
-//! The flattened BVH: built by obvhs, laid out for traversal.
+//! The flattened BVH: a binary tree built by obvhs, which [`wide`] turns into what shaders walk.
+
+pub mod wide;
 
 use super::gpu_types::{BvhNode, Triangle};
 use glam::Vec3;
@@ -7,8 +9,7 @@ use obvhs::bvh2::{Bvh2, leaf_collapser::collapse, reinsertion::ReinsertionOptimi
 use obvhs::ploc::morton::morton_encode_u128_unorm;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
-/// No path from the root is longer than this, in nodes. With [`MAX_TOP_DEPTH`] the size of the traversal's
-/// stack (`shaders/scene/bvh.wgsl`).
+/// No path from the root is longer than this, in nodes.
 pub const MAX_DEPTH: u32 = 60;
 /// No path of a top level is longer than this, in nodes: more than log2 of the instances there can be.
 pub const MAX_TOP_DEPTH: u32 = 24;
@@ -29,13 +30,13 @@ pub struct Bvh {
 /// Builds over `triangles`: at least one, all corners finite.
 ///
 /// Clustered bottom-up by obvhs (PLOC, Meister and Bittner 2018), improved by reinsertion (the same, 2018), leaves merged
-/// by SAH. Where clustering would take too long, or the tree comes out deeper than [`MAX_DEPTH`], halves by count are
-/// used instead, whose depth is logarithmic.
+/// by SAH. Where clustering would take too long, or the tree comes out deeper than [`MAX_DEPTH`] or wants a larger stack than
+/// [`wide::MAX_STACK`], halves by count are used instead, whose depth is logarithmic.
 pub fn build(triangles: &[Triangle]) -> Bvh {
     let boxes: Vec<Aabb> = triangles.iter().map(bounds_of).collect();
     if clusters_quickly(&boxes) {
         let clustered = layout(&cluster(&boxes));
-        if clustered.depth <= MAX_DEPTH {
+        if clustered.depth <= MAX_DEPTH && wide::collapse(&clustered.nodes, 0, 0, 0).stack <= wide::MAX_STACK {
             return clustered;
         }
     }
@@ -48,7 +49,8 @@ pub fn build_top(boxes: &[[Vec3; 2]]) -> Vec<BvhNode> {
     let mut bvh = halve(&boxes, 1);
     if clusters_quickly(&boxes) {
         let clustered = layout(&run_ploc(&mut PlocBuilder::with_capacity(boxes.len()), &boxes));
-        if clustered.depth <= MAX_TOP_DEPTH {
+        let stack = wide::collapse(&clustered.nodes, 0, 0, 0).stack;
+        if clustered.depth <= MAX_TOP_DEPTH && stack <= wide::MAX_TOP_STACK {
             bvh = clustered;
         }
     }
@@ -210,7 +212,7 @@ mod tests {
         Triangle { p0, p1, p2, ..bytemuck::Zeroable::zeroed() }
     }
 
-    fn soup(count: usize, seed: u64) -> Vec<Triangle> {
+    pub(super) fn soup(count: usize, seed: u64) -> Vec<Triangle> {
         let mut random = Random::new(seed);
         (0..count)
             .map(|_| {
@@ -286,12 +288,12 @@ mod tests {
     }
 
     /// At `at`, in a box of about `size`.
-    fn small(at: Vec3, size: f32) -> Triangle {
+    pub(super) fn small(at: Vec3, size: f32) -> Triangle {
         triangle([at, at + size * Vec3::X, at + size * Vec3::new(0.3, 1.0, 0.2)])
     }
 
     /// Centred at the origin.
-    fn shell(size: f32) -> Triangle {
+    pub(super) fn shell(size: f32) -> Triangle {
         triangle([Vec3::new(-size, -size, -size), Vec3::new(size, -size, size), Vec3::new(0.0, size, 0.0)])
     }
 

@@ -1,6 +1,7 @@
 //! Whether a flat scene that came from outside may be rendered: shaders check no index.
 
 use super::{Atlas, FlatEnvironment, FlatScene};
+use crate::scene::bvh::wide::MAX_ITEMS;
 use crate::scene::bvh::{MAX_DEPTH, MAX_TOP_DEPTH};
 use crate::scene::gpu_types::{
     LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, Material, NONE, TextureSlot, Triangle, TriangleAttributes,
@@ -102,6 +103,7 @@ fn tree(scene: &FlatScene, range: Range<u32>, items: Range<u32>, max_depth: u32)
             must(node.min.is_finite() && node.max.is_finite(), "a box that is not finite")?;
             must(depths[i] != 0, "belongs to no node before it")?;
             if node.count != 0 {
+                must(node.count <= MAX_ITEMS, "a leaf of too many")?;
                 let end = node.first.checked_add(node.count);
                 let within = node.first >= items.start && end.is_some_and(|end| end <= items.end);
                 return must(within, "triangles out of range").map(|()| None);
