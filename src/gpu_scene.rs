@@ -6,9 +6,11 @@ use crate::gpu::data_texture::DataTexture;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
 use crate::scene::FlatScene;
-use crate::scene::flat::{FlatInstance, levels};
 use crate::scene::bvh::wide;
-use crate::scene::gpu_types::{Instance, LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK, WideNode};
+use crate::scene::flat::{FlatInstance, levels};
+use crate::scene::gpu_types::{
+    Instance, LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK, WideNode,
+};
 use glam::{Mat4, Quat, Vec3, Vec4};
 
 /// Triangles in the first of the two buffers: 128 MiB, what every WebGPU device can bind. As in `shaders/scene/data.wgsl`.

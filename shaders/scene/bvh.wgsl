@@ -155,62 +155,83 @@ fn bvh_visit(
     return nodes[node].children[first & 3u];
 }
 
-// The closest hit with 0 < t < t_max, or, with `any_hit`, whichever is found first. Distances are the same in the space
-// of every mesh, for the ray's direction is not normalised on the way there.
-//
-// One flat loop in which every lane visits at most two nodes and then a leaf: lanes that go different ways meet again after
-// each turn, and fewer turns than nodes are counted (docs/performance.md).
-fn traverse(world_origin: vec3f, world_direction: vec3f, t_max: f32, any_hit: bool) -> Hit {
+// A ray on its way through the tree.
+struct Walk {
+    world_origin: vec3f,
+    next: u32, // what to do: a node, a leaf, LEAVE or DONE
+    world_direction: vec3f,
+    depth: u32, // entries of the stack
+    // The ray in the space of the bottom level that is walked: that of `instance`, or of the world (NONE).
+    origin: vec3f,
+    instance: u32,
+    direction: vec3f,
+    inverse: vec3f,
+    hit: Hit,
+}
+
+fn walk_start(origin: vec3f, direction: vec3f, t_max: f32) -> Walk {
     rays_traced += 1u;
-    var origin = world_origin;
-    var direction = world_direction;
-    var inverse = safe_inverse(direction);
-    var hit = Hit(t_max, NONE, vec2f(0.0), 0u);
-    var stack: array<u32, BVH_STACK>;
-    var depth = 0u;
-    var next = select(0u, frame.top_level, scene_has_instances);
-    // The instance whose bottom level is walked.
-    var instance = select(0u, NONE, scene_has_instances);
-    loop {
-        if next < LEAVE {
-            next = bvh_visit(next, origin, inverse, hit.t, &stack, &depth);
-        }
-        if next < LEAVE {
-            next = bvh_visit(next, origin, inverse, hit.t, &stack, &depth);
-        }
-        if next == DONE {
-            break;
-        }
-        if next > DONE {
-            let item = next & 0x0fffffffu;
-            if scene_has_instances && instance == NONE {
-                instance = item;
-                origin = instance_point(instance, TO_OBJECT, world_origin);
-                direction = instance_vector(instance, TO_OBJECT, world_direction);
-                inverse = safe_inverse(direction);
-                stack[depth] = LEAVE;
-                depth += 1u;
-                next = instance_texel(instance, 9u).x;
-                continue;
-            }
+    let next = select(0u, frame.top_level, scene_has_instances);
+    let instance = select(0u, NONE, scene_has_instances);
+    let hit = Hit(t_max, NONE, vec2f(0.0), 0u);
+    return Walk(origin, next, direction, 0u, origin, instance, direction, safe_inverse(direction), hit);
+}
+
+// At most two nodes and then a leaf. Lanes that go different ways meet again after each turn, and a turn costs more than
+// its nodes (docs/performance.md).
+fn walk_turn(walk: ptr<function, Walk>, stack: ptr<function, array<u32, BVH_STACK>>, any_hit: bool) {
+    var next = (*walk).next;
+    var depth = (*walk).depth;
+    var hit = (*walk).hit;
+    if next < LEAVE {
+        next = bvh_visit(next, (*walk).origin, (*walk).inverse, hit.t, stack, &depth);
+    }
+    if next < LEAVE {
+        next = bvh_visit(next, (*walk).origin, (*walk).inverse, hit.t, stack, &depth);
+    }
+    if next > DONE {
+        let item = next & 0x0fffffffu;
+        if scene_has_instances && (*walk).instance == NONE {
+            (*walk).instance = item;
+            (*walk).origin = instance_point(item, TO_OBJECT, (*walk).world_origin);
+            (*walk).direction = instance_vector(item, TO_OBJECT, (*walk).world_direction);
+            (*walk).inverse = safe_inverse((*walk).direction);
+            (*stack)[depth] = LEAVE;
+            depth += 1u;
+            next = instance_texel(item, 9u).x;
+        } else {
             let end = item + ((next >> 28u) & 7u) + 1u;
             for (var i = item; i < end; i += 1u) {
-                intersect_triangle(i, instance, origin, direction, &hit);
+                intersect_triangle(i, (*walk).instance, (*walk).origin, (*walk).direction, &hit);
             }
             if any_hit && hit.triangle != NONE {
-                break;
+                next = DONE;
+            } else {
+                next = bvh_pop(stack, &depth);
             }
-            next = bvh_pop(&stack, &depth);
-        }
-        if scene_has_instances && next == LEAVE {
-            instance = NONE;
-            origin = world_origin;
-            direction = world_direction;
-            inverse = safe_inverse(direction);
-            next = bvh_pop(&stack, &depth);
         }
     }
-    return hit;
+    if scene_has_instances && next == LEAVE {
+        (*walk).instance = NONE;
+        (*walk).origin = (*walk).world_origin;
+        (*walk).direction = (*walk).world_direction;
+        (*walk).inverse = safe_inverse((*walk).direction);
+        next = bvh_pop(stack, &depth);
+    }
+    (*walk).next = next;
+    (*walk).depth = depth;
+    (*walk).hit = hit;
+}
+
+// The closest hit with 0 < t < t_max, or, with `any_hit`, whichever is found first. Distances are the same in the space
+// of every mesh, for the ray's direction is not normalised on the way there.
+fn traverse(origin: vec3f, direction: vec3f, t_max: f32, any_hit: bool) -> Hit {
+    var stack: array<u32, BVH_STACK>;
+    var walk = walk_start(origin, direction, t_max);
+    while walk.next != DONE {
+        walk_turn(&walk, &stack, any_hit);
+    }
+    return walk.hit;
 }
 
 // A point moved off its surface along the geometric normal far enough that a ray from it cannot hit the surface again,

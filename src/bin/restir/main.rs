@@ -1,11 +1,13 @@
 //! The command line: render, compare, and ask what there is.
 
 mod bench;
+mod bench_rays;
 mod compare;
 mod failure;
 mod info;
 mod options;
 mod progress;
+mod ray_sets;
 mod render;
 mod report;
 mod scene;

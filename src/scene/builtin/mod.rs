@@ -67,7 +67,7 @@ pub const ALL: &[BuiltinInfo] = &[
         name: "hall",
         title: "Crowded hall",
         doc: "A closed hall full of displaced spheres and boxes under square lamps, of about N triangles (10,000 to 8,000,000).",
-        example: "hall:1000000",
+        example: "hall:50000",
     },
     BuiltinInfo {
         name: "glossy-spheres",
@@ -96,7 +96,7 @@ pub fn make(name: &str) -> Result<Scene> {
         "many-lights" => {
             Err(Error::bad_value("many-lights:N", "the number of lights is missing, as in many-lights:10000"))
         }
-        "hall" => Err(Error::bad_value("hall:N", "the number of triangles is missing, as in hall:1000000")),
+        "hall" => Err(Error::bad_value("hall:N", "the number of triangles is missing, as in hall:50000")),
         "glossy-spheres" => Ok(glossy_spheres::glossy_spheres()),
         _ => Err(Error::Unknown {
             kind: "built-in scene",

@@ -104,7 +104,8 @@ fn half_area(node: &BvhNode) -> f32 {
 /// is the first child over again, which does no harm.
 fn encode(boxes: [Option<[Vec3; 2]>; 4], mut children: [u32; 4]) -> WideNode {
     let present = || boxes.iter().flatten();
-    let (min, max) = present().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), b| (min.min(b[0]), max.max(b[1])));
+    let (min, max) =
+        present().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), b| (min.min(b[0]), max.max(b[1])));
     let mut grid = [min.x.to_bits(), min.y.to_bits(), min.z.to_bits(), 0];
     let mut planes = [[0u32; 3]; 2];
     for axis in 0..3 {
@@ -114,7 +115,9 @@ fn encode(boxes: [Option<[Vec3; 2]>; 4], mut children: [u32; 4]) -> WideNode {
         for (k, corners) in boxes.iter().enumerate() {
             let at = |corner: Vec3| (f64::from(corner[axis]) - f64::from(min[axis])) / step;
             let [low, high] = match corners {
-                Some([low, high]) => [at(*low).floor().clamp(0.0, 255.0) as u32, at(*high).ceil().clamp(0.0, 255.0) as u32],
+                Some([low, high]) => {
+                    [at(*low).floor().clamp(0.0, 255.0) as u32, at(*high).ceil().clamp(0.0, 255.0) as u32]
+                }
                 None => [255, 0],
             };
             planes[0][axis] |= low << (8 * k);
