@@ -40,8 +40,8 @@ pub struct Frame {
     pub history: u32,
     /// 0 box, 1 centre.
     pub pixel_filter: u32,
-    /// Unused.
-    pub padding: u32,
+    /// 0 by ray cones, 1 always the finest.
+    pub texture_levels: u32,
 }
 }
 

@@ -31,7 +31,7 @@ struct Frame {
     scene_radius: f32, // metres
     history: u32, // 1 if the previous frame's buffers may be read
     pixel_filter: u32, // PIXEL_FILTER_BOX or PIXEL_FILTER_CENTER
-    padding: u32,
+    texture_levels: u32, // TEXTURE_LEVELS_CONE or TEXTURE_LEVELS_FINEST
 }
 
 struct BvhNode {
@@ -61,15 +61,12 @@ struct Triangle {
     flags: u32,
 }
 
+// Packed as src/scene/gpu_types.rs says; unpacked in scene/texture.wgsl.
 struct TextureSlot {
     row_u: vec3f,
-    flags: u32,
+    place: u32,
     row_v: vec3f,
-    layer: u32,
-    x: u32,
-    y: u32,
-    width: u32, // 0: no texture
-    height: u32,
+    size: u32,
 }
 
 struct Material {
@@ -104,6 +101,7 @@ struct Light {
 // What the scene has, fixed when a pipeline is made (src/gpu_scene.rs), so that no kernel carries code that its scene
 // never runs. A software adapter executes both sides of a branch: there this is a factor of three.
 override scene_has_textures: bool = true;
+override scene_texture_arrays: u32 = 4u;
 override scene_has_alpha_masks: bool = true;
 override scene_has_environment: bool = true;
 override scene_has_punctual_lights: bool = true;
@@ -113,6 +111,9 @@ override scene_has_punctual_lights: bool = true;
 @group(0) @binding(2) var<storage, read> triangles: array<Triangle>;
 @group(0) @binding(3) var<storage, read> materials: array<Material>;
 @group(0) @binding(4) var<storage, read> lights: array<Light>;
-@group(0) @binding(5) var atlas: texture_2d_array<f32>;
-@group(0) @binding(6) var environment_radiance: texture_2d<f32>;
-@group(0) @binding(7) var environment_alias: texture_2d<u32>;
+@group(0) @binding(5) var environment_radiance: texture_2d<f32>;
+@group(0) @binding(6) var environment_alias: texture_2d<u32>;
+@group(0) @binding(7) var textures_0: texture_2d_array<f32>;
+@group(0) @binding(8) var textures_1: texture_2d_array<f32>;
+@group(0) @binding(9) var textures_2: texture_2d_array<f32>;
+@group(0) @binding(10) var textures_3: texture_2d_array<f32>;

@@ -1,5 +1,6 @@
 // What a ray hit, ready for shading.
 #include "scene/bvh.wgsl"
+#include "scene/ray_cone.wgsl"
 #include "lib/brdf.wgsl"
 
 struct Surface {
@@ -11,6 +12,7 @@ struct Surface {
     emission: vec3f, // radiance towards wo
     triangle: u32,
     light: u32, // index of the light this surface is, or NONE
+    footprint: f32, // width of the cone that met it, in metres
 }
 
 fn decode_normal(packed: u32) -> vec3f {
@@ -39,21 +41,22 @@ fn triangle_point(triangle: u32, uv: vec2f) -> vec3f {
     return p0 + uv.x * (triangles[triangle].p1 - p0) + uv.y * (triangles[triangle].p2 - p0);
 }
 
-// Radiance that a point of an emissive triangle sends out of its front; black where its alpha mask cuts it away.
+// Radiance that a point of an emissive triangle sends out of its front; black where its alpha mask cuts it away. Read at
+// level 0 however it was found, so that a light is the same to the ray that hits it and to the sample that chose it.
 fn emitted_radiance(triangle: u32, uv: vec2f) -> vec3f {
     if scene_has_alpha_masks && (triangles[triangle].flags & TRIANGLE_ALPHA_MASK) != 0u && !passes_alpha(triangle, uv) {
         return vec3f(0.0);
     }
     let material = triangles[triangle].material;
     let emissive = materials[material].emissive;
-    if !scene_has_textures || materials[material].emissive_texture.width == 0u {
+    if !scene_has_textures || !texture_exists(materials[material].emissive_texture) {
         return emissive;
     }
-    return emissive * texture_read(materials[material].emissive_texture, triangle_uvs(triangle, uv)).rgb;
+    return emissive * texture_read(materials[material].emissive_texture, texture_finest(triangle_uvs(triangle, uv))).rgb;
 }
 
 // The interpolated normal of a triangle, bent by its normal map, on the front side.
-fn shading_normal(triangle: u32, uv: vec2f, uvs: vec4f) -> vec3f {
+fn shading_normal(triangle: u32, uv: vec2f, uvs: TextureCoordinates) -> vec3f {
     let w = vec3f(1.0 - uv.x - uv.y, uv.x, uv.y);
     let n0 = decode_normal(triangles[triangle].normal_0);
     let n1 = decode_normal(triangles[triangle].normal_1);
@@ -63,7 +66,8 @@ fn shading_normal(triangle: u32, uv: vec2f, uvs: vec4f) -> vec3f {
     let n = normalize(select(triangle_normal(triangle), sum, has_normal));
     let flags = triangles[triangle].flags;
     let material = triangles[triangle].material;
-    if !scene_has_textures || (flags & TRIANGLE_TANGENTS) == 0u || materials[material].normal_texture.width == 0u {
+    if !scene_has_textures || (flags & TRIANGLE_TANGENTS) == 0u
+        || !texture_exists(materials[material].normal_texture) {
         return n;
     }
     // MikkTSpace: interpolate tangent, bitangent and normal without normalising, then combine.
@@ -81,14 +85,16 @@ fn shading_normal(triangle: u32, uv: vec2f, uvs: vec4f) -> vec3f {
     return select(n, normalize(bent), dot(bent, bent) > 1e-12);
 }
 
-// The surface at a point of a triangle, seen from `wo` (unit, towards the viewer).
-fn load_surface(triangle: u32, uv: vec2f, wo: vec3f) -> Surface {
-    let uvs = triangle_uvs(triangle, uv);
+// The surface at a point of a triangle, seen from `wo` (unit, towards the viewer) by a cone that is `footprint` metres
+// wide there.
+fn load_surface(triangle: u32, uv: vec2f, wo: vec3f, footprint: f32) -> Surface {
+    let uvs = texture_coordinates(triangle, uv, wo, footprint);
     let material = triangles[triangle].material;
     var surface: Surface;
     surface.position = triangle_point(triangle, uv);
     surface.wo = wo;
     surface.triangle = triangle;
+    surface.footprint = footprint;
     surface.light = triangles[triangle].light;
 
     let front = normalize(triangle_normal(triangle));

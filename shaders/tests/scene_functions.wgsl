@@ -21,7 +21,8 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
     let b = float(input.b);
     switch operation {
         case TEXTURE_READ: {
-            return TestOutput(bits(texture_read(materials[input.b.x].base_color_texture, a)), vec4u(0u));
+            return TestOutput(bits(texture_read(materials[input.b.x].base_color_texture, TextureCoordinates(a, b.yz))),
+                vec4u(0u));
         }
         case LIGHT_SAMPLE: {
             var rng = rng_new(input.a.xy, 0u, input.a.z, 0u);
@@ -59,7 +60,7 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
         }
         // At the point b.xy of the triangle input.a.x.
         case SHADING_NORMAL: {
-            return TestOutput(bits_3(shading_normal(input.a.x, b.xy, triangle_uvs(input.a.x, b.xy)), 0.0), vec4u(0u));
+            return TestOutput(bits_3(shading_normal(input.a.x, b.xy, texture_finest(triangle_uvs(input.a.x, b.xy))), 0.0), vec4u(0u));
         }
         // Whether a surface at a, normal b, sees the light sample c.xy, and what that sends there.
         case SHADOW_RAY: {

@@ -59,6 +59,8 @@ pub mod table {
 pub struct SceneFeatures {
     /// Any texture.
     pub textures: bool,
+    /// How many texture arrays.
+    pub texture_arrays: u32,
     /// Any triangle whose alpha has to be tested.
     pub alpha_masks: bool,
     /// An environment.
@@ -69,9 +71,22 @@ pub struct SceneFeatures {
 
 impl SceneFeatures {
     /// Everything: right for every scene, fast for few.
-    pub const ALL: Self = SceneFeatures { textures: true, alpha_masks: true, environment: true, punctual_lights: true };
+    pub const ALL: Self = SceneFeatures {
+        textures: true,
+        texture_arrays: 4,
+        alpha_masks: true,
+        environment: true,
+        punctual_lights: true,
+    };
 
     /// The value of the shader's `override` of this name.
+    fn value(self, name: &str) -> f64 {
+        match name {
+            "scene_texture_arrays" => self.texture_arrays.into(),
+            _ => u8::from(self.has(name)).into(),
+        }
+    }
+
     fn has(self, name: &str) -> bool {
         match name {
             "scene_has_textures" => self.textures,
@@ -128,8 +143,7 @@ impl Shader {
             label: Some(self.id),
             source: wgpu::ShaderSource::Wgsl(source.into()),
         });
-        let constants: Vec<(&str, f64)> =
-            self.overrides.iter().map(|name| (*name, f64::from(u8::from(features.has(name))))).collect();
+        let constants: Vec<(&str, f64)> = self.overrides.iter().map(|name| (*name, features.value(name))).collect();
         let groups = self.layouts(device, wgpu::ShaderStages::COMPUTE);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(self.id),

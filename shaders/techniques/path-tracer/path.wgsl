@@ -50,6 +50,7 @@ fn scattered_radiance(start: Surface, direct: bool, rng: ptr<function, Rng>) -> 
     var surface = start;
     var radiance = vec3f(0.0);
     var throughput = vec3f(1.0);
+    var spread = camera_spread(frame.camera);
     for (var depth = 1u; depth <= frame.max_depth; depth += 1u) {
         let counts = direct || depth > 1u;
         if counts && frame.light_count > 0u {
@@ -82,7 +83,8 @@ fn scattered_radiance(start: Surface, direct: bool, rng: ptr<function, Rng>) -> 
             }
             break;
         }
-        surface = load_surface(hit.triangle, hit.uv, -wi);
+        spread = scattered_spread(surface.triangle, spread, surface.footprint, pdf);
+        surface = load_surface(hit.triangle, hit.uv, -wi, surface.footprint + spread * hit.t);
         if counts {
             radiance += throughput * weighted_emission(surface, wi, hit.t, pdf);
         }
