@@ -15,6 +15,7 @@ const CAMERA = 6u;
 const OFFSET_ORIGIN = 7u;
 const SHADING_NORMAL = 8u;
 const SHADOW_RAY = 9u;
+const FOOTPRINT = 20u;
 
 fn evaluate(operation: u32, input: TestInput) -> TestOutput {
     let a = float(input.a);
@@ -70,6 +71,11 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
             let light = light_contribution(LightSample(input.c.x, input.c.y), a.xyz, false);
             let is_lit = is_visible(surface, light.direction, light.distance);
             return TestOutput(bits_3(light.value, light.distance), vec4u(u32(is_lit), 0u, 0u, 0u));
+        }
+        // Of a cone a.w wide that meets the triangle b.x from a.xyz: what it covers of a texture, and how wide it goes on.
+        case FOOTPRINT: {
+            let areas = texture_coordinates(input.b.x, vec2f(0.3), a.xyz, a.w).areas;
+            return TestOutput(bits(vec4f(areas, scattered_spread(input.b.x, b.y, a.w, b.z), 0.0)), vec4u(0u));
         }
         case OFFSET_ORIGIN: { return TestOutput(bits_3(offset_origin(a.xyz, b.xyz), 0.0), vec4u(0u)); }
         default: { return TestOutput(vec4u(0u), vec4u(0u)); }
