@@ -383,7 +383,7 @@ fn sponza_wastes_nothing() {
     let Some(path) = support::shared_file("sponza_wastes_nothing", "assets/bench/sponza.glb") else { return };
     let scene = restir::scene::gltf::load_file(&path).expect("a sound file");
     let stats = flatten(&scene).stats.texture_arrays;
-    let [bytes, used] =
-        [|s: &restir::scene::flat::TextureStats| s.bytes, |s| s.used_bytes].map(|of| stats.iter().map(of).sum::<u64>());
+    let bytes: u64 = stats.iter().map(|array| array.bytes).sum();
+    let used: u64 = stats.iter().map(|array| array.used_bytes).sum();
     assert!(stats.len() == 1 && used == bytes && bytes > 200 << 20, "{stats:?}");
 }
