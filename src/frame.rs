@@ -40,8 +40,16 @@ pub struct Frame {
     pub history: u32,
     /// 0 box, 1 centre.
     pub pixel_filter: u32,
+    /// Root of the top-level BVH in `nodes`.
+    pub top_level: u32,
     /// 0 by ray cones, 1 always the finest.
     pub texture_levels: u32,
+    /// Unused.
+    pub padding_0: u32,
+    /// Unused.
+    pub padding_1: u32,
+    /// Unused.
+    pub padding_2: u32,
 }
 }
 

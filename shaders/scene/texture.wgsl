@@ -3,7 +3,7 @@
 // before filtering whatever the format, and every driver gives the same answer.
 // Sources: Williams 1983 for the levels; Akenine-Möller et al. 2019 (Ray Tracing Gems, chapter 20) and 2021 (JCGT 10(1))
 // for choosing one along a ray. docs/textures.md says where this departs from them.
-#include "scene/bindings.wgsl"
+#include "scene/data.wgsl"
 #include "lib/color.wgsl"
 
 const WRAP_REPEAT = 0u;
@@ -63,13 +63,13 @@ fn wrap_texel(i: i32, size: i32, mode: u32) -> i32 {
 
 // One texel of one level, as it is stored.
 fn texture_load(array: u32, texel: vec2u, layer: u32, level: u32) -> vec4f {
-    if scene_texture_arrays > 1u && array == 1u {
+    if scene_has_textures_1 && array == 1u {
         return textureLoad(textures_1, texel, layer, level);
     }
-    if scene_texture_arrays > 2u && array == 2u {
+    if scene_has_textures_2 && array == 2u {
         return textureLoad(textures_2, texel, layer, level);
     }
-    if scene_texture_arrays > 3u && array == 3u {
+    if scene_has_textures_3 && array == 3u {
         return textureLoad(textures_3, texel, layer, level);
     }
     return textureLoad(textures_0, texel, layer, level);

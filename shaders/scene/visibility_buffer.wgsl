@@ -10,14 +10,15 @@ fn pixel_has_surface(pixel: vec2u) -> bool {
 }
 
 // The surface at a point of a triangle, as a pixel of `camera` sees it.
-fn load_seen(camera: CameraView, triangle: u32, uv: vec2f) -> Surface {
-    let position = triangle_point(triangle, uv);
-    return load_surface(triangle, uv, direction_to_camera(camera, position), camera_footprint(camera, position));
+fn load_seen(camera: CameraView, instance: u32, triangle: u32, uv: vec2f) -> Surface {
+    let position = triangle_point(instance, triangle, uv);
+    return load_surface(instance, triangle, uv, direction_to_camera(camera, position),
+        camera_footprint(camera, position));
 }
 
 // The surface at a pixel that has one.
 fn load_pixel(pixel: vec2u) -> Surface {
     let v = textureLoad(visibility, pixel, 0);
     let uv = bitcast<vec2f>(v.zw);
-    return load_seen(frame.camera, v.y, uv);
+    return load_seen(frame.camera, v.x, v.y, uv);
 }

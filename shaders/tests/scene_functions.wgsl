@@ -22,8 +22,8 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
     let b = float(input.b);
     switch operation {
         case TEXTURE_READ: {
-            return TestOutput(bits(texture_read(materials[input.b.x].base_color_texture, TextureCoordinates(a, b.yz))),
-                vec4u(0u));
+            return TestOutput(bits(texture_read(load_material(input.b.x).base_color_texture,
+                TextureCoordinates(a, b.yz))), vec4u(0u));
         }
         case LIGHT_SAMPLE: {
             var rng = rng_new(input.a.xy, 0u, input.a.z, 0u);
@@ -40,9 +40,10 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
             let sample = LightSample(input.b.x, input.b.y);
             let light = light_contribution(sample, a.xyz, false);
             let triangle = lights[sample.light].triangle;
-            let distance = length(triangle_point(triangle, light_sample_barycentrics(sample)) - a.xyz);
+            let instance = lights[sample.light].instance;
+            let distance = length(triangle_point(instance, triangle, light_sample_barycentrics(sample)) - a.xyz);
             return TestOutput(bits(vec4f(light_sample_pdf(sample) * light.solid_angle_jacobian,
-                light_hit_pdf(sample.light, triangle, light.direction, distance), 0.0, 0.0)), vec4u(0u));
+                light_hit_pdf(sample.light, instance, triangle, light.direction, distance), 0.0, 0.0)), vec4u(0u));
         }
         case ENVIRONMENT: {
             return TestOutput(bits_3(environment_evaluate(a.xyz), environment_pdf(a.xyz)),
@@ -74,8 +75,8 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
         }
         // Of a cone a.w wide that meets the triangle b.x from a.xyz: what it covers of a texture, and how wide it goes on.
         case FOOTPRINT: {
-            let areas = texture_coordinates(input.b.x, vec2f(0.3), a.xyz, a.w).areas;
-            return TestOutput(bits(vec4f(areas, scattered_spread(input.b.x, b.y, a.w, b.z), 0.0)), vec4u(0u));
+            let areas = texture_coordinates(0u, input.b.x, vec2f(0.3), a.xyz, a.w).areas;
+            return TestOutput(bits(vec4f(areas, scattered_spread(0u, input.b.x, b.y, a.w, b.z), 0.0)), vec4u(0u));
         }
         case OFFSET_ORIGIN: { return TestOutput(bits_3(offset_origin(a.xyz, b.xyz), 0.0), vec4u(0u)); }
         default: { return TestOutput(vec4u(0u), vec4u(0u)); }

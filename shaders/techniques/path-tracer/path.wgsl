@@ -33,7 +33,7 @@ fn weighted_emission(surface: Surface, direction: vec3f, distance: f32, brdf_pdf
     if surface.light == NONE {
         return vec3f(0.0);
     }
-    let pdf = light_hit_pdf(surface.light, surface.triangle, direction, distance);
+    let pdf = light_hit_pdf(surface.light, surface.instance, surface.triangle, direction, distance);
     return surface.emission * mis_weight(frame.mis_heuristic, brdf_pdf, pdf);
 }
 
@@ -83,8 +83,8 @@ fn scattered_radiance(start: Surface, direct: bool, rng: ptr<function, Rng>) -> 
             }
             break;
         }
-        spread = scattered_spread(surface.triangle, spread, surface.footprint, pdf);
-        surface = load_surface(hit.triangle, hit.uv, -wi, surface.footprint + spread * hit.t);
+        spread = scattered_spread(surface.instance, surface.triangle, spread, surface.footprint, pdf);
+        surface = load_surface(hit.instance, hit.triangle, hit.uv, -wi, surface.footprint + spread * hit.t);
         if counts {
             radiance += throughput * weighted_emission(surface, wi, hit.t, pdf);
         }

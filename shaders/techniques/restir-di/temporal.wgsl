@@ -71,7 +71,7 @@ fn reuse_pixel(pixel: vec2u) {
         keep(pixel);
         return;
     }
-    let previous = load_seen(frame.previous_camera, seen.y, bitcast<vec2f>(seen.zw));
+    let previous = load_seen(frame.previous_camera, seen.x, seen.y, bitcast<vec2f>(seen.zw));
     if !is_same_surface(surface, previous) {
         keep(pixel);
         return;

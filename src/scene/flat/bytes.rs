@@ -38,6 +38,9 @@ struct Header {
 struct Sections {
     nodes: usize,
     triangles: usize,
+    attributes: usize,
+    meshes: usize,
+    instances: usize,
     materials: usize,
     lights: usize,
     environment_texels: usize,
@@ -88,6 +91,9 @@ impl FlatScene {
         };
         section(bytemuck::cast_slice(&self.nodes));
         section(bytemuck::cast_slice(&self.triangles));
+        section(bytemuck::cast_slice(&self.attributes));
+        section(bytemuck::cast_slice(&self.meshes));
+        section(bytemuck::cast_slice(&self.instances));
         section(bytemuck::cast_slice(&self.materials));
         section(bytemuck::cast_slice(&self.lights));
         for array in &self.textures {
@@ -121,11 +127,15 @@ impl FlatScene {
         }
         let header = reader.take(u32::from_le_bytes(word(2)) as usize, "header")?;
         let header: Header = serde_json::from_slice(header).map_err(|e| bad("header", e.to_string()))?;
-        let Sections { nodes, triangles, materials, lights, environment_texels } = header.sections;
+        let Sections { nodes, triangles, attributes, meshes, instances, materials, lights, environment_texels } =
+            header.sections;
         let scene = FlatScene {
             name: header.name,
             nodes: reader.array(nodes, "nodes")?,
             triangles: reader.array(triangles, "triangles")?,
+            attributes: reader.array(attributes, "attributes")?,
+            meshes: reader.array(meshes, "meshes")?,
+            instances: reader.array(instances, "instances")?,
             materials: reader.array(materials, "materials")?,
             lights: reader.array(lights, "lights")?,
             first_punctual: header.first_punctual,
@@ -218,6 +228,9 @@ fn header_of(scene: &FlatScene) -> Header {
         sections: Sections {
             nodes: scene.nodes.len(),
             triangles: scene.triangles.len(),
+            attributes: scene.attributes.len(),
+            meshes: scene.meshes.len(),
+            instances: scene.instances.len(),
             materials: scene.materials.len(),
             lights: scene.lights.len(),
             environment_texels: scene.environment.as_ref().map_or(0, |e| e.radiance.len()),
