@@ -143,6 +143,12 @@ fn features(scene: &FlatScene) -> SceneFeatures {
         alpha_masks: scene.triangles.iter().any(|t| t.flags & TRIANGLE_ALPHA_MASK != 0),
         environment: environment_light(scene) != NONE,
         punctual_lights: scene.lights.iter().any(|l| l.kind != LIGHT_TRIANGLE && l.kind != LIGHT_ENVIRONMENT),
+        transmission: false,
+        sheen: false,
+        clearcoat: false,
+        iridescence: false,
+        energy_compensation: false,
+        conserving_mix: false,
     }
 }
 

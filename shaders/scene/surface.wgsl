@@ -1,13 +1,13 @@
 // What a ray hit, ready for shading.
 #include "scene/bvh.wgsl"
-#include "lib/brdf.wgsl"
+#include "lib/bsdf/bsdf.wgsl"
 
 struct Surface {
     position: vec3f,
     geometric_normal: vec3f, // unit, on the side of wo
     basis: Basis, // round the shading normal
     wo: vec3f, // unit, world space, towards the viewer
-    brdf: Brdf,
+    bsdf: Bsdf,
     emission: vec3f, // radiance towards wo
     triangle: u32,
     light: u32, // index of the light this surface is, or NONE
@@ -106,10 +106,12 @@ fn load_surface(triangle: u32, uv: vec2f, wo: vec3f) -> Surface {
 
     let metallic_roughness = texture_read(materials[material].metallic_roughness_texture, uvs);
     let roughness = clamp(materials[material].roughness * metallic_roughness.g, 0.0, 1.0);
-    surface.brdf.base_color = clamp(materials[material].base_color.rgb * triangle_color(triangle, uv).rgb
+    surface.bsdf.base_color = clamp(materials[material].base_color.rgb * triangle_color(triangle, uv).rgb
         * texture_read(materials[material].base_color_texture, uvs).rgb, vec3f(0.0), vec3f(1.0));
-    surface.brdf.metallic = clamp(materials[material].metallic * metallic_roughness.b, 0.0, 1.0);
-    surface.brdf.alpha = max(roughness * roughness, MINIMUM_ALPHA);
+    surface.bsdf.metallic = clamp(materials[material].metallic * metallic_roughness.b, 0.0, 1.0);
+    surface.bsdf.alpha = vec2f(max(roughness * roughness, MINIMUM_ALPHA));
+    surface.bsdf.f0 = vec3f(0.04);
+    surface.bsdf.f90 = 1.0;
 
     surface.emission = vec3f(0.0);
     if surface.light != NONE && (is_front || materials[material].double_sided == 1u) {
@@ -128,18 +130,18 @@ fn surface_evaluate(surface: Surface, wi: vec3f) -> vec3f {
     if !above_surface(surface, wi) {
         return vec3f(0.0);
     }
-    return brdf_evaluate(surface.brdf, basis_to_local(surface.basis, surface.wo), basis_to_local(surface.basis, wi));
+    return bsdf_evaluate(surface.bsdf, LOBE_ALL, basis_to_local(surface.basis, surface.wo), basis_to_local(surface.basis, wi));
 }
 
 // Density per solid angle with which `surface_sample` draws wi.
 fn surface_pdf(surface: Surface, wi: vec3f) -> f32 {
-    return brdf_pdf(surface.brdf, basis_to_local(surface.basis, surface.wo), basis_to_local(surface.basis, wi));
+    return bsdf_pdf(surface.bsdf, LOBE_ALL, basis_to_local(surface.basis, surface.wo), basis_to_local(surface.basis, wi));
 }
 
 // A world direction drawn for the BRDF; may point below the surface, where everything is zero.
 fn surface_sample(surface: Surface, u: vec3f) -> vec3f {
     return normalize(basis_to_world(surface.basis,
-        brdf_sample(surface.brdf, basis_to_local(surface.basis, surface.wo), u)));
+        bsdf_sample(surface.bsdf, LOBE_ALL, basis_to_local(surface.basis, surface.wo), u).wi));
 }
 
 // Whether nothing stands between the surface and the point at `distance` along wi. The ray starts a little above the

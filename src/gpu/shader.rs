@@ -54,7 +54,7 @@ pub mod table {
     include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 }
 
-/// What a scene has: kernels leave out the code for what it has not.
+/// What a scene has, and settings that change code: kernels leave out the code for what is not there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct SceneFeatures {
     /// Any texture.
@@ -65,11 +65,34 @@ pub struct SceneFeatures {
     pub environment: bool,
     /// Any point, spot or directional light.
     pub punctual_lights: bool,
+    /// Any material that transmits light.
+    pub transmission: bool,
+    /// Any material with sheen.
+    pub sheen: bool,
+    /// Any material with a clearcoat.
+    pub clearcoat: bool,
+    /// Any material with a thin film.
+    pub iridescence: bool,
+    /// `render.energy_compensation`.
+    pub energy_compensation: bool,
+    /// `render.conserving_mix`.
+    pub conserving_mix: bool,
 }
 
 impl SceneFeatures {
-    /// Everything: right for every scene, fast for few.
-    pub const ALL: Self = SceneFeatures { textures: true, alpha_masks: true, environment: true, punctual_lights: true };
+    /// Everything a scene can have, with settings at their defaults: right for every scene, fast for few.
+    pub const ALL: Self = SceneFeatures {
+        textures: true,
+        alpha_masks: true,
+        environment: true,
+        punctual_lights: true,
+        transmission: true,
+        sheen: true,
+        clearcoat: true,
+        iridescence: true,
+        energy_compensation: false,
+        conserving_mix: false,
+    };
 
     /// The value of the shader's `override` of this name.
     fn has(self, name: &str) -> bool {
@@ -78,6 +101,12 @@ impl SceneFeatures {
             "scene_has_alpha_masks" => self.alpha_masks,
             "scene_has_environment" => self.environment,
             "scene_has_punctual_lights" => self.punctual_lights,
+            "scene_has_transmission" => self.transmission,
+            "scene_has_sheen" => self.sheen,
+            "scene_has_clearcoat" => self.clearcoat,
+            "scene_has_iridescence" => self.iridescence,
+            "energy_compensation" => self.energy_compensation,
+            "conserving_mix" => self.conserving_mix,
             _ => true,
         }
     }
