@@ -353,3 +353,215 @@ fn every_lobe_is_sampled_with_its_density() {
         }
     }
 }
+
+/// Albedo of one lobe towards wo: the mean of f |cos| / density over a regular grid of random numbers.
+fn lobe_albedos(model: Model, materials: &[Bsdf], lobes: &[u32], cosines: &[f32]) -> Vec<Vec<Vec<f64>>> {
+    const STEPS: u32 = 48;
+    let each = (STEPS * STEPS) as usize;
+    let mut queries = Vec::new();
+    for material in 0..materials.len() {
+        for &cosine in cosines {
+            let wo = Vec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine);
+            for &lobes in lobes {
+                queries.extend((0..STEPS * STEPS).map(|i| {
+                    let u = [i % STEPS, i / STEPS].map(|k| (k as f32 + 0.5) / STEPS as f32);
+                    Query { material, wo, b: Vec3::new(u[0], u[1], 0.5), lobes }
+                }));
+            }
+        }
+    }
+    let outputs = eval(&gpu(), Operation::Sample, model, materials, &queries);
+    let albedo = |outputs: &[support::harness::TestOutput]| {
+        let weight = |o: &support::harness::TestOutput| {
+            let [r, g, b, pdf] = o.b();
+            if pdf > 0.0 { f64::from(r.max(g).max(b) / pdf) } else { 0.0 }
+        };
+        outputs.iter().map(weight).sum::<f64>() / each as f64
+    };
+    outputs
+        .chunks(each * lobes.len() * cosines.len())
+        .map(|m| m.chunks(each * lobes.len()).map(|c| c.chunks(each).map(albedo).collect()).collect())
+        .collect()
+}
+
+const ROUGHNESS: [f32; 5] = [0.0, 0.15, 0.3, 0.6, 1.0];
+const COSINES: [f32; 4] = [1.0, 0.7, 0.3, 0.05];
+
+/// (what, material of a roughness, its lobes, model, most that may come back).
+type Furnace = (&'static str, fn(f32) -> Bsdf, &'static [u32], Model, f64);
+
+fn alpha(roughness: f32) -> f32 {
+    (roughness * roughness).max(0.001)
+}
+
+fn rough(roughness: f32) -> Bsdf {
+    Bsdf { alpha: Vec2::splat(alpha(roughness)), ..Bsdf::default() }
+}
+
+fn metal(roughness: f32) -> Bsdf {
+    Bsdf { metallic: 1.0, ..rough(roughness) }
+}
+
+fn glass(roughness: f32, eta: f32) -> Bsdf {
+    let index = if eta == 0.0 { 1.5 } else { eta };
+    let f0 = ((index - 1.0) / (index + 1.0)).powi(2);
+    Bsdf { transmission: 1.0, eta, f0: Vec3::splat(f0), ..rough(roughness) }
+}
+
+fn velvet(roughness: f32, base: Vec3) -> Bsdf {
+    let sheen_alpha = (roughness * roughness).max(0.0025);
+    Bsdf { base_color: base, sheen_color: Vec3::ONE, sheen_alpha, ..rough(0.5) }
+}
+
+fn filmed(roughness: f32, metallic: f32) -> Bsdf {
+    Bsdf { iridescence: 1.0, film_ior: 1.8, film_thickness: 350.0, metallic, ..rough(roughness) }
+}
+
+/// The white furnace: what comes back of light 1 from everywhere. The limit is 1 and the grid's error, but for what the
+/// specification itself gains.
+const FURNACE: [Furnace; 17] = [
+    ("diffuse under the specular layer, specification", rough, &[DIFFUSE], SPECIFICATION, 1.002),
+    ("specular layer alone, index 1.5", rough, &[SPECULAR], SPECIFICATION, 1.002),
+    ("metal", metal, &[SPECULAR], SPECIFICATION, 1.002),
+    ("metal, energy compensation", metal, &[SPECULAR], COMPENSATED, 1.005),
+    ("dielectric, specification", rough, &[DIFFUSE, SPECULAR], SPECIFICATION, 1.6),
+    ("dielectric, conserving mix", rough, &[DIFFUSE, SPECULAR], CONSERVING, 1.002),
+    ("dielectric, conserving mix and energy compensation", rough, &[DIFFUSE, SPECULAR], COMPENSATED, 1.005),
+    ("thin wall, index 1.5", |r| glass(r, 0.0), &[SPECULAR, TRANSMISSION], SPECIFICATION, 1.002),
+    ("into glass, index 1.5", |r| glass(r, 1.5), &[SPECULAR, TRANSMISSION], SPECIFICATION, 1.002),
+    ("out of glass, index 1.5", |r| glass(r, 1.0 / 1.5), &[SPECULAR, TRANSMISSION], SPECIFICATION, 1.002),
+    ("into diamond, index 2.4", |r| glass(r, 2.4), &[SPECULAR, TRANSMISSION], SPECIFICATION, 1.002),
+    ("out of diamond, index 2.4", |r| glass(r, 1.0 / 2.4), &[SPECULAR, TRANSMISSION], SPECIFICATION, 1.002),
+    ("sheen alone", |r| velvet(r, Vec3::ZERO), &[SHEEN], SPECIFICATION, 1.002),
+    ("sheen over white, conserving mix", |r| velvet(r, Vec3::ONE), &[DIFFUSE, SPECULAR, SHEEN], CONSERVING, 1.002),
+    ("clearcoat over white metal", |r| Bsdf { clearcoat: 1.0, clearcoat_alpha: alpha(r), ..metal(0.3) },
+        &[SPECULAR, CLEARCOAT], SPECIFICATION, 1.002),
+    ("film on metal", |r| filmed(r, 1.0), &[SPECULAR], SPECIFICATION, 1.002),
+    ("film on glass", |r| Bsdf { transmission: 1.0, eta: 0.0, ..filmed(r, 0.0) }, &[SPECULAR, TRANSMISSION], SPECIFICATION, 1.002),
+];
+
+/// The table of docs/materials.md: `cargo test --test bsdf furnace -- --nocapture` prints it.
+#[test]
+fn no_lobe_passes_the_white_furnace_but_the_one_that_is_known() {
+    println!("| | {} |", ROUGHNESS.map(|r| format!("roughness {r}")).join(" | "));
+    println!("|---|{}", "---|".repeat(ROUGHNESS.len()));
+    let mut known: f64 = 0.0;
+    let mut problems = Vec::new();
+    for (what, make, lobes, model, limit) in FURNACE {
+        let materials = ROUGHNESS.map(make);
+        let albedos = lobe_albedos(model, &materials, lobes, &COSINES);
+        let mut cells = Vec::new();
+        for (roughness, of_material) in ROUGHNESS.iter().zip(albedos) {
+            let sums: Vec<f64> = of_material.iter().map(|of_cosine| of_cosine.iter().sum()).collect();
+            for (cosine, sum) in COSINES.iter().zip(&sums) {
+                if *sum > limit {
+                    problems.push(format!("{what}: {sum} at roughness {roughness}, cosine {cosine}"));
+                }
+                if what == "dielectric, specification" {
+                    known = known.max(*sum);
+                }
+                // With energy compensation a white metal loses nothing.
+                if what == "metal, energy compensation" && *sum < 0.98 {
+                    problems.push(format!("{what}: only {sum} at roughness {roughness}, cosine {cosine}"));
+                }
+            }
+            cells.push(sums.iter().map(|sum| format!("{sum:.3}")).collect::<Vec<_>>().join(" "));
+        }
+        println!("| {what} | {} |", cells.join(" | "));
+    }
+    assert!(problems.is_empty(), "{}", problems.join("\n"));
+    assert!(known > 1.5, "the specification's mix is known to gain light at grazing angles: {known}");
+}
+
+/// The table that build.rs makes equals integrals done here, to its 8 bits and the error of interpolation.
+#[test]
+fn the_albedo_table_is_the_integral() {
+    let mut worst = [0.0f64; 3];
+    for roughness in [0.2, 0.45, 0.62, 0.9] {
+        let a: f64 = roughness * roughness;
+        for cosine in [0.05, 0.13, 0.3, 0.55, 0.8, 0.99] {
+            let wo = DVec3::new((1.0f64 - cosine * cosine).sqrt(), 0.0, cosine);
+            let (mut whole, mut grazing, mut sheen) = (0.0, 0.0, 0.0);
+            let (rings, sectors) = (400, 400);
+            for i in 0..rings {
+                let (sin, cos) = ((f64::from(i) + 0.5) / f64::from(rings) * FRAC_PI_2).sin_cos();
+                for j in 0..sectors {
+                    let (sin_phi, cos_phi) = ((f64::from(j) + 0.5) / f64::from(sectors) * PI).sin_cos();
+                    let wi = DVec3::new(sin * cos_phi, sin * sin_phi, cos);
+                    let h = (wo + wi).normalize();
+                    let lambda = |w: DVec3| 1.0 / g1(glam::DVec2::splat(a), w) - 1.0;
+                    let d = support::bsdf::distribution(glam::DVec2::splat(a), h);
+                    let f = d / (1.0 + lambda(wo) + lambda(wi)) / (4.0 * wo.z);
+                    whole += f * sin;
+                    grazing += f * schlick(wo.dot(h)) * sin;
+                    sheen += sheen_value(a, wo, wi) * wi.z * sin;
+                }
+            }
+            let step = 2.0 * (FRAC_PI_2 / f64::from(rings)) * (PI / f64::from(sectors));
+            let expected = [whole * step, grazing * step, sheen * step];
+            let actual = table_read(cosine, roughness);
+            for channel in 0..3 {
+                let error = actual[channel] - expected[channel].min(1.0);
+                worst[channel] = worst[channel].max(error.abs());
+                assert!(error > -0.012 && error < 0.02, "channel {channel}: {} at roughness {roughness}, cosine {cosine} is not {}", actual[channel], expected[channel]);
+            }
+        }
+    }
+    println!("largest errors: {worst:.4?}");
+    // The shader reads the same.
+    let points = [(0.31f32, 0.77f32), (0.0, 0.0), (1.0, 1.0), (0.99, 0.02)];
+    let queries = points.map(|(cosine, roughness)| Query {
+        material: 0,
+        wo: Vec3::Z,
+        b: Vec3::new(cosine, roughness, 0.0),
+        lobes: ALL,
+    });
+    let outputs = eval(&gpu(), Operation::Iridescence, SPECIFICATION, &[Bsdf::default()], &queries);
+    for ((cosine, roughness), output) in points.into_iter().zip(outputs) {
+        let expected = table_read(cosine.into(), roughness.into());
+        assert!(d(xyz(output.b())).distance(expected) < 1e-4, "{cosine} {roughness}");
+    }
+    assert_eq!(albedo_table::TEXELS.len(), 4 * (albedo_table::SIZE * albedo_table::SIZE) as usize);
+}
+
+/// The film's reflectance equals its twin, and far from interference (a film much thicker than the coherence of daylight)
+/// the closed form of a stack of two interfaces: R12 + T12^2 R23 / (1 - R12 R23).
+#[test]
+fn films_interfere() {
+    let mut random = Random::new(6);
+    let mut films = Vec::new();
+    for i in 0..200 {
+        let f0 = Vec3::new(random.unit(), random.unit(), random.unit());
+        let film_thickness = if i % 2 == 0 { 1000.0 * random.unit() } else { 1e5 };
+        films.push(Bsdf { f0, film_ior: 1.0 + 1.5 * random.unit(), film_thickness, ..Bsdf::default() });
+    }
+    let queries: Vec<_> = (0..films.len())
+        .map(|material| Query { material, wo: polar(FRAC_PI_2 * f64::from(random.unit()), 0.0), b: Vec3::ZERO, lobes: 0 })
+        .collect();
+    let mut colourful = 0;
+    for (query, output) in
+        queries.iter().zip(eval(&gpu(), Operation::Iridescence, SPECIFICATION, &films, &queries))
+    {
+        let film = &films[query.material];
+        let cosine = f64::from(query.wo.z);
+        let (ior, thickness, f0) = (f64::from(film.film_ior), f64::from(film.film_thickness), d(film.f0));
+        let expected = iridescent_fresnel(ior, thickness, f0, cosine);
+        let actual = d(xyz(output.a()));
+        assert!(actual.distance(expected) < 2e-3, "{actual} is not {expected}: {film:?}");
+        if thickness < 1e4 {
+            colourful += usize::from((expected.x - expected.z).abs() > 0.05);
+            continue;
+        }
+        let sin_2 = (1.0 - cosine * cosine) / (ior * ior);
+        let r12 = ((ior - 1.0) / (ior + 1.0)).powi(2);
+        let r12 = r12 + (1.0 - r12) * schlick(cosine);
+        for c in 0..3 {
+            let n = (1.0 + f0[c].sqrt()) / (1.0 - f0[c].sqrt());
+            let r23 = ((n - ior) / (n + ior)).powi(2);
+            let r23 = r23 + (1.0 - r23) * schlick((1.0 - sin_2).sqrt());
+            let incoherent = r12 + (1.0 - r12).powi(2) * r23 / (1.0 - r12 * r23);
+            assert!((actual[c] - incoherent).abs() < 5e-3, "{} is not {incoherent}: {film:?}", actual[c]);
+        }
+    }
+    assert!(colourful > 30, "{colourful}");
+}

@@ -7,7 +7,7 @@ use crate::scene::{self, AlphaMode, Scene, TextureRef, Wrap};
 use glam::Vec3;
 
 const UV_SET_1: u32 = 1;
-const SRGB: u32 = 2;
+pub(super) const SRGB: u32 = 2;
 const LINEAR_FILTER: u32 = 4;
 const WRAP_U_SHIFT: u32 = 4;
 const WRAP_V_SHIFT: u32 = 6;
@@ -42,12 +42,13 @@ fn flatten_one(
     let slot = |texture, srgb| slot(texture, srgb, scene, rectangles);
     Ok(Material {
         base_color: material.base_color,
-        emissive: material.emissive,
+        // An unlit surface shines, but is no light.
+        emissive: if material.unlit { Vec3::ZERO } else { material.emissive },
         metallic: material.metallic,
         roughness: material.roughness,
         normal_scale: material.normal_scale,
         alpha_cutoff: cutoff,
-        double_sided: u32::from(material.double_sided),
+        double_sided: u32::from(material.is_two_sided()),
         base_color_texture: slot(material.base_color_texture, SRGB)?,
         metallic_roughness_texture: slot(material.metallic_roughness_texture, 0)?,
         normal_texture: slot(material.normal_texture, 0)?,
@@ -55,7 +56,7 @@ fn flatten_one(
     })
 }
 
-fn slot(
+pub(super) fn slot(
     reference: Option<TextureRef>,
     srgb: u32,
     scene: &Scene,

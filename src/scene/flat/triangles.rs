@@ -48,7 +48,7 @@ pub(super) fn bake(scene: &Scene, progress: &mut dyn FnMut(f32, &str)) -> Result
         let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
         let flags = scene.materials.get(mesh.material as usize).map_or(0, |material| {
             let masked = matches!(material.alpha, AlphaMode::Mask(_));
-            u32::from(material.double_sided) * TRIANGLE_DOUBLE_SIDED + u32::from(masked) * TRIANGLE_ALPHA_MASK
+            u32::from(material.is_two_sided()) * TRIANGLE_DOUBLE_SIDED + u32::from(masked) * TRIANGLE_ALPHA_MASK
         });
         let placed = Placed::new(mesh, instance, i as u32, flags);
         for corners in mesh.indices.as_chunks::<3>().0 {
