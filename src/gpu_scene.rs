@@ -2,19 +2,35 @@
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::gpu::data_texture::DataTexture;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
 use crate::scene::FlatScene;
-use crate::scene::gpu_types::{LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK};
-use glam::{Quat, Vec3};
+use crate::scene::flat::{FlatInstance, levels};
+use crate::scene::gpu_types::{
+    BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, MATERIAL_UNLIT, MATERIAL_VOLUME, MaterialExtensions, NONE,
+    TRIANGLE_ALPHA_MASK,
+};
+use glam::{Mat4, Quat, Vec3, Vec4};
+
+/// Triangles in the first of the two buffers: 128 MiB, what every WebGPU device can bind. As in `shaders/scene/data.wgsl`.
+const FIRST_TRIANGLES: usize = (128 << 20) / size_of::<crate::scene::gpu_types::Triangle>();
 
 /// A [`FlatScene`] on the device.
 #[derive(Debug)]
 pub struct GpuScene {
     nodes: wgpu::Buffer,
-    triangles: wgpu::Buffer,
-    materials: wgpu::Buffer,
+    /// The first [`FIRST_TRIANGLES`], and all others.
+    triangles: [wgpu::Buffer; 2],
     lights: wgpu::Buffer,
+    attributes: DataTexture,
+    materials: DataTexture,
+    material_extensions: DataTexture,
+    instances: DataTexture,
+    /// Object to world of each instance in the frame that is uploaded.
+    transforms: Vec<Mat4>,
+    /// Index in `nodes` of the root of everything.
+    top_level: u32,
     atlas: wgpu::TextureView,
     environment_radiance: wgpu::TextureView,
     environment_alias: wgpu::TextureView,
@@ -56,13 +72,24 @@ impl GpuScene {
             Some(e) => ([e.width, e.height, 1], &e.radiance, &e.alias),
             None => (black.0, &black.1, &black.2),
         };
+        let (first_triangles, rest) = scene.triangles.split_at(scene.triangles.len().min(FIRST_TRIANGLES));
+        let point = [bytemuck::Zeroable::zeroed()];
+        let transforms: Vec<Mat4> = scene.instances.iter().map(|i| i.transform).collect();
         let first = scene.first_punctual as usize;
         let punctual: Vec<Light> =
             scene.lights.iter().skip(first).filter(|l| l.kind != LIGHT_ENVIRONMENT).copied().collect();
         Ok(GpuScene {
             nodes: gpu.storage_of("nodes", &scene.nodes)?,
-            triangles: gpu.storage_of("triangles", &scene.triangles)?,
-            materials: gpu.storage_of("materials", &scene.materials)?,
+            triangles: [
+                gpu.storage_of("triangles", first_triangles)?,
+                gpu.storage_of("the triangles after the first 2796202", if rest.is_empty() { &point } else { rest })?,
+            ],
+            attributes: DataTexture::new(gpu, "attributes", &scene.attributes)?,
+            materials: DataTexture::new(gpu, "materials", &scene.materials)?,
+            material_extensions: DataTexture::new(gpu, "material extensions", &scene.material_extensions)?,
+            instances: DataTexture::new(gpu, "instances", &instance_records(scene, &transforms, &transforms))?,
+            transforms,
+            top_level: scene.root(),
             lights: if scene.lights.is_empty() {
                 gpu.storage("lights", std::mem::size_of::<Light>() as u64)?
             } else {
@@ -115,6 +142,33 @@ impl GpuScene {
         gpu.queue.write_buffer(&self.lights, offset, bytemuck::cast_slice(&self.punctual));
     }
 
+    /// Moves the instances: `transforms` is object to world of each. The top level is rebuilt over them; where they stood
+    /// before becomes the previous frame's place. A transform that cannot be undone hides its instance.
+    pub fn place(&mut self, gpu: &Gpu, scene: &FlatScene, transforms: &[Mat4]) {
+        if transforms.len() != scene.instances.len() || !scene.has_top_level() {
+            return;
+        }
+        let boxes: Vec<[Vec3; 2]> = scene
+            .instances
+            .iter()
+            .zip(transforms)
+            .map(|(instance, &transform)| {
+                let root = &scene.nodes[scene.meshes[instance.mesh as usize].root as usize];
+                levels::transformed_box(transform, [root.min, root.max])
+            })
+            .collect();
+        let nodes = levels::top_level(&boxes, self.top_level);
+        let offset = u64::from(self.top_level) * size_of::<BvhNode>() as u64;
+        gpu.queue.write_buffer(&self.nodes, offset, bytemuck::cast_slice(&nodes));
+        self.instances.write(gpu, 0, &instance_records(scene, transforms, &self.transforms));
+        self.transforms = transforms.to_vec();
+    }
+
+    /// Index in `nodes` of the root of everything.
+    pub fn top_level(&self) -> u32 {
+        self.top_level
+    }
+
     /// The punctual lights as they are uploaded now, in the order of the scene.
     pub fn punctual_lights(&self) -> &[Light] {
         &self.punctual
@@ -124,9 +178,13 @@ impl GpuScene {
     pub fn share<'a>(&'a self, recorder: &mut Recorder<'a>) {
         recorder.features = self.features;
         recorder.share("nodes", &self.nodes);
-        recorder.share("triangles", &self.triangles);
-        recorder.share("materials", &self.materials);
+        recorder.share("triangles", &self.triangles[0]);
+        recorder.share("triangles_rest", &self.triangles[1]);
         recorder.share("lights", &self.lights);
+        recorder.share("attributes", &self.attributes.view);
+        recorder.share("materials", &self.materials.view);
+        recorder.share("material_extensions", &self.material_extensions.view);
+        recorder.share("instances", &self.instances.view);
         recorder.share("atlas", &self.atlas);
         recorder.share("environment_radiance", &self.environment_radiance);
         recorder.share("environment_alias", &self.environment_alias);
@@ -134,22 +192,51 @@ impl GpuScene {
 }
 
 fn features(scene: &FlatScene) -> SceneFeatures {
-    let slots = scene
+    let core = scene
         .materials
         .iter()
         .flat_map(|m| [m.base_color_texture, m.metallic_roughness_texture, m.normal_texture, m.emissive_texture]);
+    let extended = scene.material_extensions.iter().flat_map(|m| m.slots());
+    let any = |has: fn(&MaterialExtensions) -> bool| scene.material_extensions.iter().any(has);
     SceneFeatures {
-        textures: slots.into_iter().any(|slot| slot.width > 0),
+        textures: core.into_iter().any(|slot| slot.width > 0) || extended.into_iter().any(|slot| slot.width > 0),
         alpha_masks: scene.triangles.iter().any(|t| t.flags & TRIANGLE_ALPHA_MASK != 0),
         environment: environment_light(scene) != NONE,
         punctual_lights: scene.lights.iter().any(|l| l.kind != LIGHT_TRIANGLE && l.kind != LIGHT_ENVIRONMENT),
-        transmission: false,
-        sheen: false,
-        clearcoat: false,
-        iridescence: false,
+        instances: scene.has_top_level(),
+        many_triangles: scene.triangles.len() > FIRST_TRIANGLES,
+        transmission: any(|m| m.transmission > 0.0),
+        volumes: any(|m| m.flags & MATERIAL_VOLUME != 0),
+        dispersion: any(|m| m.flags & MATERIAL_VOLUME != 0 && m.dispersion > 0.0),
+        unlit: any(|m| m.flags & MATERIAL_UNLIT != 0),
+        anisotropy: any(|m| m.anisotropy > 0.0),
+        // Where a medium is outside, index 1.5 reflects something else.
+        specular: any(|m| {
+            m.ior != 1.5
+                || m.specular != 1.0
+                || m.specular_color != Vec3::ONE
+                || m.slots()[..2].iter().any(|slot| slot.width > 0)
+                || m.flags & MATERIAL_VOLUME != 0
+        }),
+        sheen: any(|m| m.sheen_color != Vec3::ZERO),
+        clearcoat: any(|m| m.clearcoat > 0.0),
+        iridescence: any(|m| m.iridescence > 0.0),
         energy_compensation: false,
         conserving_mix: false,
     }
+}
+
+fn instance_records(scene: &FlatScene, transforms: &[Mat4], previous: &[Mat4]) -> Vec<Instance> {
+    let record = |((instance, &transform), &previous): ((&FlatInstance, &Mat4), &Mat4)| Instance {
+        to_object: if levels::is_invertible(transform) { levels::rows(transform.inverse()) } else { [Vec4::ZERO; 3] },
+        to_world: levels::rows(transform),
+        previous_to_world: levels::rows(previous),
+        root: scene.meshes[instance.mesh as usize].root,
+        first_light: instance.first_light,
+        previous_triangles: 0,
+        padding: 0,
+    };
+    scene.instances.iter().zip(transforms).zip(previous).map(record).collect()
 }
 
 /// Index of the environment among the lights, or `NONE`.

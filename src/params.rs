@@ -226,6 +226,18 @@ params! {
         roulette_threshold: float(1.0, 0.001..=100.0, ""),
         /// Where in its pixel a primary ray goes: `box` anywhere in the square, which averages to a smooth picture; `center` through the middle, which keeps edges out of error measurements but aliases (biased against the box filter).
         pixel_filter: choice(0, ["box", "center"]),
+        /// Whether light that scatters more than once between microfacets is given back to the GGX reflection (Turquin 2019, thesis 000 2.1.3). On: rough metals are as bright as smooth ones. Off: as glTF's formula has it, which is darker.
+        energy_compensation: flag(false),
+        /// Whether the diffuse lobe gets only the light that the specular layer leaves over. On: energy is conserved. Off: as glTF's formula has it, which gains light at grazing angles.
+        conserving_mix: flag(false),
+    }
+}
+
+impl RenderParams {
+    /// Puts in what changes the code of kernels.
+    pub fn specialise(&self, features: &mut crate::gpu::shader::SceneFeatures) {
+        features.energy_compensation = self.energy_compensation != 0;
+        features.conserving_mix = self.conserving_mix != 0;
     }
 }
 

@@ -54,62 +54,78 @@ pub mod table {
     include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 }
 
-/// What a scene has, and settings that change code: kernels leave out the code for what is not there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct SceneFeatures {
-    /// Any texture.
-    pub textures: bool,
-    /// Any triangle whose alpha has to be tested.
-    pub alpha_masks: bool,
-    /// An environment.
-    pub environment: bool,
-    /// Any point, spot or directional light.
-    pub punctual_lights: bool,
-    /// Any material that transmits light.
-    pub transmission: bool,
-    /// Any material with sheen.
-    pub sheen: bool,
-    /// Any material with a clearcoat.
-    pub clearcoat: bool,
-    /// Any material with a thin film.
-    pub iridescence: bool,
-    /// `render.energy_compensation`.
-    pub energy_compensation: bool,
-    /// `render.conserving_mix`.
-    pub conserving_mix: bool,
+/// Declares the features once: the struct, its extremes, and the WGSL `override` (`scene_has_NAME`) of each.
+macro_rules! scene_features {
+    ($($(#[$meta:meta])* $name:ident,)*) => {
+        /// What a scene has, and settings that change code: kernels leave out the code for what is not there.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub struct SceneFeatures {
+            $($(#[$meta])* pub $name: bool,)*
+            /// The setting `render.energy_compensation`.
+            pub energy_compensation: bool,
+            /// The setting `render.conserving_mix`.
+            pub conserving_mix: bool,
+        }
+
+        impl SceneFeatures {
+            /// Everything, with settings at their defaults: right for every scene, fast for few.
+            pub const ALL: Self =
+                SceneFeatures { $($name: true,)* energy_compensation: false, conserving_mix: false };
+            /// Nothing: single-sided triangles that shine evenly.
+            pub const NONE: Self =
+                SceneFeatures { $($name: false,)* energy_compensation: false, conserving_mix: false };
+
+            /// The names of the `override` declarations.
+            pub const OVERRIDES: &[&str] = &[
+                $(concat!("scene_has_", stringify!($name)),)*
+                "energy_compensation",
+                "conserving_mix",
+            ];
+
+            /// The value of the shader's `override` of this name.
+            fn has(self, name: &str) -> bool {
+                match name {
+                    $(concat!("scene_has_", stringify!($name)) => self.$name,)*
+                    "energy_compensation" => self.energy_compensation,
+                    "conserving_mix" => self.conserving_mix,
+                    _ => true,
+                }
+            }
+        }
+    };
 }
 
-impl SceneFeatures {
-    /// Everything a scene can have, with settings at their defaults: right for every scene, fast for few.
-    pub const ALL: Self = SceneFeatures {
-        textures: true,
-        alpha_masks: true,
-        environment: true,
-        punctual_lights: true,
-        transmission: true,
-        sheen: true,
-        clearcoat: true,
-        iridescence: true,
-        energy_compensation: false,
-        conserving_mix: false,
-    };
-
-    /// The value of the shader's `override` of this name.
-    fn has(self, name: &str) -> bool {
-        match name {
-            "scene_has_textures" => self.textures,
-            "scene_has_alpha_masks" => self.alpha_masks,
-            "scene_has_environment" => self.environment,
-            "scene_has_punctual_lights" => self.punctual_lights,
-            "scene_has_transmission" => self.transmission,
-            "scene_has_sheen" => self.sheen,
-            "scene_has_clearcoat" => self.clearcoat,
-            "scene_has_iridescence" => self.iridescence,
-            "energy_compensation" => self.energy_compensation,
-            "conserving_mix" => self.conserving_mix,
-            _ => true,
-        }
-    }
+scene_features! {
+    /// Any texture.
+    textures,
+    /// Any triangle whose alpha has to be tested.
+    alpha_masks,
+    /// An environment.
+    environment,
+    /// Any point, spot or directional light.
+    punctual_lights,
+    /// A top level: more than one mesh that is in world space already.
+    instances,
+    /// More triangles than one storage binding holds.
+    many_triangles,
+    /// Any material that transmits light.
+    transmission,
+    /// Any material that bounds a medium.
+    volumes,
+    /// Any medium that bends colours apart.
+    dispersion,
+    /// Any material without lighting.
+    unlit,
+    /// Any material with highlights stretched along a direction.
+    anisotropy,
+    /// Any material whose dielectric reflection is not that of index 1.5.
+    specular,
+    /// Any material with sheen.
+    sheen,
+    /// Any material with a clearcoat.
+    clearcoat,
+    /// Any material with a thin film.
+    iridescence,
 }
 
 /// A pipeline and the layouts its bind groups are made with.

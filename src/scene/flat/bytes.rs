@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 const _: () = assert!(cfg!(target_endian = "little"), "arrays are copied as they lie in memory");
 
 const MAGIC: [u8; 4] = *b"RSTR";
-const VERSION: u32 = 1;
+const VERSION: u32 = 3;
 const PREFIX: usize = 16;
 const ALIGNMENT: usize = 16;
 
@@ -38,7 +38,11 @@ struct Header {
 struct Sections {
     nodes: usize,
     triangles: usize,
+    attributes: usize,
+    meshes: usize,
+    instances: usize,
     materials: usize,
+    material_extensions: usize,
     lights: usize,
     atlas_texels: usize,
     environment_texels: usize,
@@ -80,7 +84,11 @@ impl FlatScene {
         };
         section(bytemuck::cast_slice(&self.nodes));
         section(bytemuck::cast_slice(&self.triangles));
+        section(bytemuck::cast_slice(&self.attributes));
+        section(bytemuck::cast_slice(&self.meshes));
+        section(bytemuck::cast_slice(&self.instances));
         section(bytemuck::cast_slice(&self.materials));
+        section(bytemuck::cast_slice(&self.material_extensions));
         section(bytemuck::cast_slice(&self.lights));
         section(&self.atlas.texels);
         if let Some(environment) = &self.environment {
@@ -111,12 +119,27 @@ impl FlatScene {
         }
         let header = reader.take(u32::from_le_bytes(word(2)) as usize, "header")?;
         let header: Header = serde_json::from_slice(header).map_err(|e| bad("header", e.to_string()))?;
-        let Sections { nodes, triangles, materials, lights, atlas_texels, environment_texels } = header.sections;
+        let Sections {
+            nodes,
+            triangles,
+            attributes,
+            meshes,
+            instances,
+            materials,
+            material_extensions,
+            lights,
+            atlas_texels,
+            environment_texels,
+        } = header.sections;
         let scene = FlatScene {
             name: header.name,
             nodes: reader.array(nodes, "nodes")?,
             triangles: reader.array(triangles, "triangles")?,
+            attributes: reader.array(attributes, "attributes")?,
+            meshes: reader.array(meshes, "meshes")?,
+            instances: reader.array(instances, "instances")?,
             materials: reader.array(materials, "materials")?,
+            material_extensions: reader.array(material_extensions, "material extensions")?,
             lights: reader.array(lights, "lights")?,
             first_punctual: header.first_punctual,
             motions: header.motions.into_iter().map(MotionRecord::into_motion).collect(),
@@ -213,7 +236,11 @@ fn header_of(scene: &FlatScene) -> Header {
         sections: Sections {
             nodes: scene.nodes.len(),
             triangles: scene.triangles.len(),
+            attributes: scene.attributes.len(),
+            meshes: scene.meshes.len(),
+            instances: scene.instances.len(),
             materials: scene.materials.len(),
+            material_extensions: scene.material_extensions.len(),
             lights: scene.lights.len(),
             atlas_texels: scene.atlas.texels.len(),
             environment_texels: scene.environment.as_ref().map_or(0, |e| e.radiance.len()),
