@@ -8,8 +8,8 @@ use crate::gpu::shader::SceneFeatures;
 use crate::scene::FlatScene;
 use crate::scene::flat::{FlatInstance, levels};
 use crate::scene::gpu_types::{
-    BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, MATERIAL_UNLIT, MATERIAL_VOLUME, MaterialExtensions, NONE,
-    TRIANGLE_ALPHA_MASK,
+    BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, MATERIAL_UNLIT, MATERIAL_VOLUME, MaterialExtensions,
+    NONE, TRIANGLE_ALPHA_MASK,
 };
 use glam::{Mat4, Quat, Vec3, Vec4};
 

@@ -4,9 +4,7 @@
 mod support;
 
 use glam::{DVec3, Vec2, Vec3};
-use restir::scene::{
-    Camera, Environment, Mesh, Projection, PunctualKind, PunctualLight, Scene, gltf, shapes,
-};
+use restir::scene::{Camera, Environment, Mesh, Projection, PunctualKind, PunctualLight, Scene, gltf, shapes};
 use restir::{Error, Result};
 use serde_json::{Value, json};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -64,6 +62,13 @@ fn pbr(color: [f32; 3], metallic: f32, roughness: f32) -> Value {
     let [r, g, b] = color;
     json!({"pbrMetallicRoughness":
         {"baseColorFactor": [r, g, b, 1], "metallicFactor": metallic, "roughnessFactor": roughness}})
+}
+
+/// Shines and reflects nothing.
+fn lamp(color: [f32; 3]) -> Value {
+    let mut material = extended(pbr([0.0; 3], 0.0, 1.0), "KHR_materials_specular", json!({"specularFactor": 0}));
+    material["emissiveFactor"] = json!(color);
+    material
 }
 
 /// The scene seen along a direction `angle` radians from +Y, in the plane x, y, by an orthographic camera that covers a
@@ -224,8 +229,7 @@ fn iridescence() {
             "KHR_materials_iridescence",
             json!({"iridescenceFactor": 0.9, "iridescenceIor": 1.7, "iridescenceThicknessMaximum": 420}),
         );
-        let bsdf =
-            Bsdf { metallic, iridescence: 0.9, film_ior: 1.7, film_thickness: 420.0, ..base(0.4) };
+        let bsdf = Bsdf { metallic, iridescence: 0.9, film_ior: 1.7, film_thickness: 420.0, ..base(0.4) };
         check_under_sun(material, bsdf, near_mirror(), &format!("film, metallic {metallic}"));
     }
     // Under an even sky a smooth metal shows the film's reflectance itself.
@@ -257,7 +261,7 @@ fn thin_walls_transmit() {
 
     // Smooth, between an upper sky and a lower light: F of one and 1 - F of the other, tinted.
     let angle = 1.1f64;
-    let floor = json!({"emissiveFactor": [1, 1, 1], "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]}});
+    let floor = lamp([1.0; 3]);
     let mut scene = seen(file(&[square(0.0, 2.0, 0), square(-0.1, 50.0, 1)], &[thin(BASE, 0.0), floor]), angle);
     scene.environment = Some(Environment::even(Vec3::new(0.5, 1.0, 2.0)));
     let f = 0.04 + 0.96 * schlick(angle.cos());
@@ -329,7 +333,10 @@ fn extensions_at_their_zero_are_the_core_material() {
         ("KHR_materials_ior", json!({"ior": 1.5})),
         ("KHR_materials_specular", json!({"specularFactor": 1, "specularColorFactor": [1, 1, 1]})),
         ("KHR_materials_transmission", json!({"transmissionFactor": 0})),
-        ("KHR_materials_volume", json!({"thicknessFactor": 1, "attenuationDistance": 1, "attenuationColor": [0, 0, 0]})),
+        (
+            "KHR_materials_volume",
+            json!({"thicknessFactor": 1, "attenuationDistance": 1, "attenuationColor": [0, 0, 0]}),
+        ),
         ("KHR_materials_clearcoat", json!({"clearcoatFactor": 0, "clearcoatRoughnessFactor": 0.5})),
         ("KHR_materials_sheen", json!({"sheenColorFactor": [0, 0, 0], "sheenRoughnessFactor": 0.5})),
         ("KHR_materials_anisotropy", json!({"anisotropyStrength": 0, "anisotropyRotation": 1})),
@@ -344,7 +351,8 @@ fn extensions_at_their_zero_are_the_core_material() {
 /// colour at a time, and that the three colours together weigh what they should.
 #[test]
 fn dispersion_keeps_the_light() {
-    let material = extended(glass(1.7, json!({"thicknessFactor": 1})), "KHR_materials_dispersion", json!({"dispersion": 2}));
+    let material =
+        extended(glass(1.7, json!({"thicknessFactor": 1})), "KHR_materials_dispersion", json!({"dispersion": 2}));
     let mut scene = seen(file(&[block(20.0, 0.4, 0)], &[material]), 0.9);
     scene.environment = Some(Environment::even(Vec3::ONE));
     let spread = 0.7 * 0.025 * 2.0;
@@ -367,14 +375,14 @@ fn unlit_shows_its_colour() {
     let plate = pbr([0.7; 3], 0.0, 1.0);
     let mut ceiling = shapes::parallelogram(Vec3::new(-1.0, 1.0, -1.0), Vec3::X * 2.0, Vec3::Z * 2.0, 1);
     ceiling.uvs[0] = vec![Vec2::ZERO; 4];
-    let light = json!({"emissiveFactor": [0.9, 0.4, 0.1], "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]},
-                       "extensions": {"KHR_materials_specular": {"specularFactor": 0}}});
-    let of = |material: Value, technique: &str| {
+    let of = |mut material: Value, technique: &str| {
+        // So that it shades the plate.
+        material["doubleSided"] = true.into();
         let mut scene = seen(file(&[square(0.0, 2.0, 0), ceiling.clone()], &[plate.clone(), material]), 1.0);
         scene.lights = vec![sun(DVec3::NEG_Y, Vec3::splat(10.0))];
         radiance(&scene, technique, 1, 128)
     };
-    let expected = of(light, "path-tracer");
+    let expected = of(lamp([0.9, 0.4, 0.1]), "path-tracer");
     assert!(expected.x > 0.1, "{expected}");
     for technique in ["path-tracer", "restir-di"] {
         assert_radiance(of(unlit.clone(), technique), expected, 0.02, &format!("under an unlit ceiling, {technique}"));
@@ -402,17 +410,26 @@ fn techniques_agree_on_every_lobe() {
 
 #[test]
 fn the_loader_clamps_and_refuses() {
-    let one = |extension: &str, value: Value| load(file(&[square(0.0, 1.0, 0)], &[extended(json!({}), extension, value)]));
+    let one =
+        |extension: &str, value: Value| load(file(&[square(0.0, 1.0, 0)], &[extended(json!({}), extension, value)]));
     let clamped = [
         ("KHR_materials_transmission", json!({"transmissionFactor": 7}), "transmissionFactor is clamped to [0, 1]"),
         ("KHR_materials_ior", json!({"ior": 0.5}), "ior is clamped to at least 1"),
         ("KHR_materials_clearcoat", json!({"clearcoatRoughnessFactor": -1}), "clearcoatRoughnessFactor is clamped"),
-        ("KHR_materials_specular", json!({"specularColorFactor": [1, -1, 2]}), "specularColorFactor is clamped to at least 0"),
+        (
+            "KHR_materials_specular",
+            json!({"specularColorFactor": [1, -1, 2]}),
+            "specularColorFactor is clamped to at least 0",
+        ),
         ("KHR_materials_sheen", json!({"sheenColorFactor": [1, 2, 3]}), "sheenColorFactor is clamped"),
         ("KHR_materials_anisotropy", json!({"anisotropyStrength": -2}), "anisotropyStrength is clamped"),
         ("KHR_materials_iridescence", json!({"iridescenceIor": 0}), "iridescenceIor is clamped"),
         ("KHR_materials_dispersion", json!({"dispersion": -1}), "dispersion is clamped"),
-        ("KHR_materials_volume", json!({"thicknessFactor": 1, "attenuationDistance": 0}), "attenuationDistance is not positive"),
+        (
+            "KHR_materials_volume",
+            json!({"thicknessFactor": 1, "attenuationDistance": 0}),
+            "attenuationDistance is not positive",
+        ),
     ];
     for (extension, value, warning) in clamped {
         let scene = one(extension, value).expect("a file that loads");

@@ -212,7 +212,8 @@ pub fn iridescent_fresnel(film_ior: f64, thickness: f64, f0: DVec3, cosine: f64)
 fn sensitivity(difference: f64, shift: DVec3) -> DVec3 {
     let phase = TAU * difference * 1e-9;
     let gaussian = |value: f64, position: f64, variance: f64, shift: f64| {
-        value * (TAU * variance).sqrt() * (position * phase + shift).cos() * (-phase * phase * variance).exp() / 1.0685e-7
+        value * (TAU * variance).sqrt() * (position * phase + shift).cos() * (-phase * phase * variance).exp()
+            / 1.0685e-7
     };
     let x = gaussian(5.4856e-13, 1.6810e6, 4.3278e9, shift.x) + gaussian(9.7470e-14, 2.2399e6, 4.5282e9, shift.x);
     let y = gaussian(4.4201e-13, 1.7953e6, 9.3046e9, shift.y);
@@ -442,12 +443,10 @@ impl Bsdf {
         if wi.z < 0.0 {
             return transmission * self.transmission_pdf(wo, wi);
         }
-        let reflection = |alpha: DVec2, o: DVec3, i: DVec3| {
-            g1(alpha, o) * distribution(alpha, (o + i).normalize()) / (4.0 * o.z)
-        };
-        let coat = self
-            .coat_frame(wo, wi)
-            .map_or(0.0, |(o, i)| reflection(DVec2::splat(self.clearcoat_alpha.into()), o, i));
+        let reflection =
+            |alpha: DVec2, o: DVec3, i: DVec3| g1(alpha, o) * distribution(alpha, (o + i).normalize()) / (4.0 * o.z);
+        let coat =
+            self.coat_frame(wo, wi).map_or(0.0, |(o, i)| reflection(DVec2::splat(self.clearcoat_alpha.into()), o, i));
         diffuse * wi.z / PI + specular * reflection(self.alphas(), wo, wi) + sheen / TAU + clearcoat * coat
     }
 }

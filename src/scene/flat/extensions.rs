@@ -25,8 +25,8 @@ fn flatten_one(
     rectangles: &[Rectangle],
 ) -> std::result::Result<MaterialExtensions, String> {
     let Material { specular, transmission, clearcoat, sheen, anisotropy, iridescence, .. } = material;
-    let flags = if material.unlit { MATERIAL_UNLIT } else { 0 }
-        | if material.bounds_a_medium() { MATERIAL_VOLUME } else { 0 };
+    let flags =
+        if material.unlit { MATERIAL_UNLIT } else { 0 } | if material.bounds_a_medium() { MATERIAL_VOLUME } else { 0 };
     let slot = |texture, srgb| slot(texture, srgb, scene, rectangles);
     let flat = MaterialExtensions {
         specular_color: specular.color,

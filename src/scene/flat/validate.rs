@@ -3,7 +3,8 @@
 use super::{Atlas, FlatEnvironment, FlatScene};
 use crate::scene::bvh::{MAX_DEPTH, MAX_TOP_DEPTH};
 use crate::scene::gpu_types::{
-    LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, Material, MaterialExtensions, NONE, TextureSlot, Triangle, TriangleAttributes,
+    LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, Material, MaterialExtensions, NONE, TextureSlot, Triangle,
+    TriangleAttributes,
 };
 use std::ops::Range;
 

@@ -137,7 +137,9 @@ impl<'a> Extension<'a> {
         let numbers: Option<Vec<f32>> = items.iter().map(|item| item.as_f64().map(|number| number as f32)).collect();
         match numbers.and_then(|numbers| <[f32; N]>::try_from(numbers).ok()) {
             Some(numbers) => loader.document.finite(numbers, &place),
-            None => Err(loader.document.bad(place, if N == 1 { "is not a number" } else { "is not a list of 3 numbers" })),
+            None => {
+                Err(loader.document.bad(place, if N == 1 { "is not a number" } else { "is not a list of 3 numbers" }))
+            }
         }
     }
 
@@ -154,7 +156,14 @@ impl<'a> Extension<'a> {
         Ok(self.clamped(loader, name, values, min, max))
     }
 
-    fn clamped<const N: usize>(&self, loader: &mut Loader, name: &str, values: [f32; N], min: f32, max: f32) -> [f32; N] {
+    fn clamped<const N: usize>(
+        &self,
+        loader: &mut Loader,
+        name: &str,
+        values: [f32; N],
+        min: f32,
+        max: f32,
+    ) -> [f32; N] {
         let clamped = values.map(|value| value.clamp(min, max));
         if clamped != values {
             let range = if max == f32::MAX { format!("at least {min}") } else { format!("[{min}, {max}]") };
