@@ -62,7 +62,12 @@ fn main() {
     assert!(errors.is_empty(), "{} shader(s) failed:\n{}", errors.len(), errors.join("\n"));
     writeln!(table, "/// Every pass.\npub static ALL: &[&Shader] = &[{}];", list(&names, |n| format!("&{n}"))).unwrap();
     std::fs::write(out.join("shaders.rs"), table).expect("OUT_DIR is writable");
-    std::fs::write(out.join("albedo.bin"), albedo::table()).expect("OUT_DIR is writable");
+    // A second of work, and the same for every shader: only when its source is newer.
+    let time = |path: &Path| std::fs::metadata(path).and_then(|m| m.modified()).ok();
+    let albedo = out.join("albedo.bin");
+    if time(&albedo).is_none() || time(&albedo) < time(&root.join("../build/albedo.rs")) {
+        std::fs::write(albedo, albedo::table()).expect("OUT_DIR is writable");
+    }
 }
 
 /// Every file with an entry point, relative to `root`.

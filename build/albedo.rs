@@ -10,26 +10,33 @@ use std::f64::consts::{FRAC_PI_2, PI};
 pub const SIZE: usize = 32;
 /// The shader's own limits (`ggx.wgsl`, `sheen.wgsl`).
 const MINIMUM_ALPHA: f64 = 0.001;
-const MINIMUM_SHEEN_ALPHA: f64 = 0.0025;
+const MINIMUM_SHEEN_ALPHA: f64 = 0.01;
 /// Stands for the horizon, where the integrands are 0 / 0.
-const MINIMUM_COSINE: f64 = 0.005;
+const MINIMUM_COSINE: f64 = 0.0005;
 /// Steps of the midpoint rules along each dimension.
-const GGX_STEPS: usize = 32;
-const SHEEN_STEPS: usize = 48;
+const GGX_STEPS: usize = 24;
+const SHEEN_STEPS: usize = 32;
+/// The same for smooth sheens, which are narrow.
+const SMOOTH_SHEEN_STEPS: usize = 64;
 
-/// RGBA8 texels, row by row: red E of GGX, green the share of F90 in it, blue E of the sheen. Rounded up, so that what is
-/// built on them never gains light.
+/// RGBA8 texels, row by row: red E of GGX, green the share of F90 in it, blue E of the sheen up to 1, alpha a quarter of
+/// what it has beyond 1. Rows: roughness; columns: the square root of the cosine, for all changes at the horizon. Rounded
+/// up, so that what is built on them never gains light.
 pub fn table() -> Vec<u8> {
+    let cosine = |column: usize| (column as f64 / (SIZE - 1) as f64).powi(2).max(MINIMUM_COSINE);
     let mut texels = Vec::with_capacity(SIZE * SIZE * 4);
+    let mut sheens = (0.0, Vec::new());
     for row in 0..SIZE {
-        let roughness = row as f64 / (SIZE - 1) as f64;
-        let alpha = roughness * roughness;
-        let sheen = Sheen::new(alpha.max(MINIMUM_SHEEN_ALPHA));
-        for column in 0..SIZE {
-            let cosine = (column as f64 / (SIZE - 1) as f64).max(MINIMUM_COSINE);
-            let [whole, grazing] = ggx(alpha.max(MINIMUM_ALPHA), cosine);
-            texels.extend([whole, grazing, sheen.albedo(cosine)].map(|x| (x.clamp(0.0, 1.0) * 255.0).ceil() as u8));
-            texels.push(255);
+        let alpha = (row as f64 / (SIZE - 1) as f64).powi(2);
+        let sheen_alpha = alpha.max(MINIMUM_SHEEN_ALPHA);
+        if sheens.0 != sheen_alpha {
+            let sheen = Sheen::new(sheen_alpha);
+            sheens = (sheen_alpha, (0..SIZE).map(|column| sheen.albedo(cosine(column))).collect());
+        }
+        for (column, sheen) in sheens.1.iter().enumerate() {
+            let [whole, grazing] = ggx(alpha.max(MINIMUM_ALPHA), cosine(column));
+            let channels = [whole, grazing, *sheen, 0.25 * (sheen - 1.0)];
+            texels.extend(channels.map(|x| (x.clamp(0.0, 1.0) * 255.0).ceil() as u8));
         }
     }
     texels
@@ -71,9 +78,10 @@ struct Sheen {
 
 impl Sheen {
     fn new(alpha: f64) -> Self {
-        let steps = (0..SHEEN_STEPS)
+        let count = if alpha < 0.06 { SMOOTH_SHEEN_STEPS } else { SHEEN_STEPS };
+        let steps = (0..count)
             .map(|i| {
-                let (sin, cos) = (FRAC_PI_2 * (i as f64 + 0.5) / SHEEN_STEPS as f64).sin_cos();
+                let (sin, cos) = (FRAC_PI_2 * (i as f64 + 0.5) / count as f64).sin_cos();
                 [cos, sin, sheen_lambda(alpha, cos)]
             })
             .collect();
@@ -84,10 +92,11 @@ impl Sheen {
     fn albedo(&self, cosine: f64) -> f64 {
         let wo = [(1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine];
         let lambda = sheen_lambda(self.alpha, cosine);
+        let count = self.steps.len();
         let mut sum = 0.0;
         for [cos_theta, sin_theta, lambda_i] in &self.steps {
-            for j in 0..SHEEN_STEPS {
-                let (sin_phi, cos_phi) = (PI * (j as f64 + 0.5) / SHEEN_STEPS as f64).sin_cos();
+            for j in 0..count {
+                let (sin_phi, cos_phi) = (PI * (j as f64 + 0.5) / count as f64).sin_cos();
                 let h = normalize([wo[0] + sin_theta * cos_phi, sin_theta * sin_phi, wo[2] + cos_theta]);
                 let sin_2 = (1.0 - h[2] * h[2]).max(0.0);
                 let d = (2.0 + 1.0 / self.alpha) * sin_2.powf(0.5 / self.alpha) / (2.0 * PI);
@@ -95,7 +104,7 @@ impl Sheen {
             }
         }
         // Half a turn counts twice.
-        sum * 2.0 * (FRAC_PI_2 / SHEEN_STEPS as f64) * (PI / SHEEN_STEPS as f64)
+        sum * 2.0 * (FRAC_PI_2 / count as f64) * (PI / count as f64)
     }
 }
 

@@ -74,17 +74,23 @@ fn triangle_point(instance: u32, triangle: u32, uv: vec2f) -> vec3f {
     return instance_point(instance, TO_WORLD, point);
 }
 
-// Radiance that a point of an emissive triangle sends out of its front; black where its alpha mask cuts it away.
-fn emitted_radiance(triangle: u32, uv: vec2f) -> vec3f {
+// Radiance that a point of an emissive triangle sends out of its front, at a cosine to its normal; black where its alpha
+// mask cuts it away. A clearcoat dims it (KHR_materials_clearcoat), here by the mesh's own normal, so that a light is the
+// same to the ray that hits it and to the sample that chose it.
+fn emitted_radiance(triangle: u32, uv: vec2f, cosine: f32) -> vec3f {
     let t = load_triangle(triangle);
     if scene_has_alpha_masks && (t.flags & TRIANGLE_ALPHA_MASK) != 0u && !passes_alpha(triangle, uv) {
         return vec3f(0.0);
     }
     let material = load_material(t.material);
-    if !scene_has_textures || material.emissive_texture.width == 0u {
-        return material.emissive;
+    let uvs = triangle_uvs(triangle, uv);
+    var radiance = material.emissive * texture_read(material.emissive_texture, uvs).rgb;
+    if scene_has_clearcoat {
+        let extensions = load_extensions(t.material);
+        let coat = extensions.clearcoat * texture_read(extensions.clearcoat_texture, uvs).r;
+        radiance *= 1.0 - coat * mix(CLEARCOAT_F0, 1.0, schlick_weight(cosine));
     }
-    return material.emissive * texture_read(material.emissive_texture, triangle_uvs(triangle, uv)).rgb;
+    return radiance;
 }
 
 // The frame of a triangle's point in its mesh's space, on the front side. MikkTSpace interpolates all three without
@@ -177,7 +183,7 @@ fn load_surface(instance: u32, triangle: u32, uv: vec2f, wo: vec3f) -> Surface {
 
     surface.emission = vec3f(0.0);
     if surface.light != NONE && (surface.is_front || material.double_sided == 1u) {
-        surface.emission = emitted_radiance(triangle, uv);
+        surface.emission = emitted_radiance(triangle, uv, abs(dot(front, wo)));
     }
     extend_surface(&surface, shading, uvs, side);
     return surface;

@@ -34,7 +34,7 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
         case IRIDESCENCE: {
             return TestOutput(
                 bits_3(iridescent_reflectance(material.film_ior, material.film_thickness, material.f0, wo.z), 0.0),
-                bits_3(albedo_read(b.x, b.y), 0.0));
+                bits(albedo_read(b.x, b.y)));
         }
         default: { return TestOutput(vec4u(0u), vec4u(0u)); }
     }

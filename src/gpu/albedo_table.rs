@@ -1,8 +1,9 @@
 //! The table of directional albedos on the device.
 
-/// Entries along each axis: cosine along x, roughness along y (`build/albedo.rs`).
+/// Entries along each axis: square root of the cosine along x, roughness along y (`build/albedo.rs`).
 pub const SIZE: u32 = 32;
-/// RGBA8 texels, row by row: red E of a GGX reflection with F = 1, green the share of F90 in it, blue E of the sheen.
+/// RGBA8 texels, row by row: red E of a GGX reflection with F = 1, green the share of F90 in it, blue E of the sheen up to
+/// 1, alpha a quarter of what it has beyond 1.
 pub const TEXELS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/albedo.bin"));
 
 /// Uploads it.

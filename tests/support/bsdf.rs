@@ -2,7 +2,7 @@
 //! the glTF specification, appendix B, and the extensions' texts rather than from the WGSL.
 
 use super::harness::{TestInput, TestOutput, TestRun};
-use glam::{DVec2, DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3, DVec4, Vec2, Vec3};
 use restir::Gpu;
 use restir::gpu::albedo_table;
 use restir::gpu::recorder::Recorder;
@@ -241,14 +241,14 @@ pub fn sheen_value(alpha: f64, wo: DVec3, wi: DVec3) -> f64 {
     distribution / ((1.0 + lambda(wo.z) + lambda(wi.z)) * 4.0 * wo.z * wi.z)
 }
 
-/// The albedo table (E, share of F90, sheen), read bilinearly.
-pub fn table_read(cosine: f64, roughness: f64) -> DVec3 {
+/// The albedo table (E, share of F90, sheen up to 1, a quarter of what is beyond), read bilinearly.
+pub fn table_read(cosine: f64, roughness: f64) -> DVec4 {
     let last = f64::from(albedo_table::SIZE - 1);
-    let p = DVec2::new(cosine, roughness).clamp(DVec2::ZERO, DVec2::ONE) * last;
+    let p = DVec2::new(cosine.max(0.0).sqrt(), roughness).clamp(DVec2::ZERO, DVec2::ONE) * last;
     let (x, y) = ((p.x as usize).min(30), (p.y as usize).min(30));
     let texel = |x: usize, y: usize| {
         let at = (y * albedo_table::SIZE as usize + x) * 4;
-        DVec3::from_array([0, 1, 2].map(|c| f64::from(albedo_table::TEXELS[at + c]) / 255.0))
+        DVec4::from_array([0, 1, 2, 3].map(|c| f64::from(albedo_table::TEXELS[at + c]) / 255.0))
     };
     let f = p - DVec2::new(x as f64, y as f64);
     texel(x, y).lerp(texel(x + 1, y), f.x).lerp(texel(x, y + 1).lerp(texel(x + 1, y + 1), f.x), f.y)
@@ -343,8 +343,13 @@ impl Bsdf {
         (o.z > 1e-6 && i.z > 1e-6).then_some((o, i))
     }
 
+    fn sheen_albedo(&self, cosine: f64) -> f64 {
+        let table = table_read(cosine.abs(), f64::from(self.sheen_alpha).sqrt());
+        table.z + 4.0 * table.w
+    }
+
     fn sheen_scale(&self, cosine: f64) -> f64 {
-        d(self.sheen_color).max_element() * table_read(cosine.abs(), f64::from(self.sheen_alpha).sqrt()).z
+        d(self.sheen_color).max_element() * self.sheen_albedo(cosine)
     }
 
     /// Albedo of the dielectric's specular layer, for the conserving mix.
@@ -391,7 +396,10 @@ impl Bsdf {
             let e = table_read(wo.z, self.roughness()).x;
             specular *= 1.0 + d(self.f0).lerp(base, metallic) * (1.0 - e) / e;
         }
-        let sheen = d(self.sheen_color) * sheen_value(self.sheen_alpha.into(), wo, wi);
+        let mut sheen = d(self.sheen_color) * sheen_value(self.sheen_alpha.into(), wo, wi);
+        if model.conserving_mix {
+            sheen /= self.sheen_albedo(wo.z).max(self.sheen_albedo(wi.z)).max(1.0);
+        }
         let clearcoat = match self.coat_frame(wo, wi) {
             Some((o, i)) => {
                 let alpha = DVec2::splat(self.clearcoat_alpha.into());
@@ -407,19 +415,18 @@ impl Bsdf {
     /// Probabilities of the lobes of a mask, in the order of [`LOBES`].
     pub fn probabilities(&self, lobes: u32, wo: DVec3) -> [f64; 5] {
         let coat = self.coat_weight(wo);
-        let sheen = self.sheen_scale(wo.z);
-        let below = (1.0 - coat) * (1.0 - sheen).max(0.0);
+        let sheen_albedo = self.sheen_albedo(wo.z).min(1.0);
+        let below = (1.0 - coat) * (1.0 - d(self.sheen_color).max_element() * sheen_albedo);
         let fresnel = self.dielectric_fresnel(wo.z);
         let (metallic, transmission) = (f64::from(self.metallic), f64::from(self.transmission));
         let base = (1.0 - metallic) * luminance(d(self.base_color));
         let through = below * base * (1.0 - fresnel.max_element());
         let specular = below * luminance(fresnel.lerp(self.metal_fresnel(wo.z), metallic));
-        let table = table_read(wo.z, f64::from(self.sheen_alpha).sqrt()).z;
         let weights = [
             (through * (1.0 - transmission), base * (1.0 - transmission) > 0.0),
             (specular, true),
             (through * transmission, base * transmission > 0.0),
-            ((1.0 - coat) * luminance(d(self.sheen_color)) * table, self.sheen_color != Vec3::ZERO),
+            ((1.0 - coat) * luminance(d(self.sheen_color)) * sheen_albedo, self.sheen_color != Vec3::ZERO),
             (coat, self.clearcoat > 0.0),
         ];
         let mut index = 0;

@@ -130,8 +130,18 @@ fn clearcoat_reflectance(bsdf: Bsdf, wo: vec3f) -> f32 {
     return bsdf.clearcoat * mix(CLEARCOAT_F0, 1.0, schlick_weight(abs(dot(bsdf.clearcoat_normal, wo))));
 }
 
+// More than 1 for smooth sheens near the horizon: there the extension's formula gains light.
 fn sheen_albedo(bsdf: Bsdf, cosine: f32) -> f32 {
-    return albedo_read(abs(cosine), sqrt(bsdf.sheen_alpha)).z;
+    let table = albedo_read(abs(cosine), sqrt(bsdf.sheen_alpha));
+    return table.z + 4.0 * table.w;
+}
+
+// What the conserving setting takes away of that.
+fn sheen_share(bsdf: Bsdf, wo: vec3f, wi: vec3f) -> f32 {
+    if !conserving_mix {
+        return 1.0;
+    }
+    return 1.0 / max(1.0, max(sheen_albedo(bsdf, wo.z), sheen_albedo(bsdf, wi.z)));
 }
 
 // What the sheen lets through to the base: Conty Estevez and Kulla's albedo scaling.
@@ -151,7 +161,7 @@ fn lobe_probabilities(bsdf: Bsdf, lobes: u32, wo: vec3f) -> LobeProbabilities {
     var sheen = 0.0;
     var below_sheen = below_coat;
     if scene_has_sheen {
-        let albedo = sheen_albedo(bsdf, wo.z);
+        let albedo = min(sheen_albedo(bsdf, wo.z), 1.0);
         sheen = below_coat * luminance(bsdf.sheen_color) * albedo;
         below_sheen = below_coat * max(1.0 - max_component(bsdf.sheen_color) * albedo, 0.0);
     }
@@ -226,7 +236,8 @@ fn bsdf_evaluate(bsdf: Bsdf, lobes: u32, wo: vec3f, wi: vec3f) -> vec3f {
     }
     value *= below;
     if scene_has_sheen && has_lobe(lobes, LOBE_SHEEN) {
-        value += bsdf.sheen_color * ((1.0 - coat) * sheen_evaluate(bsdf.sheen_alpha, wo, wi));
+        value += bsdf.sheen_color * ((1.0 - coat) * sheen_share(bsdf, wo, wi)
+            * sheen_evaluate(bsdf.sheen_alpha, wo, wi));
     }
     if scene_has_clearcoat && has_lobe(lobes, LOBE_CLEARCOAT) {
         value += coat * clearcoat_evaluate(bsdf, wo, wi);

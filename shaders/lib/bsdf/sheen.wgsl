@@ -2,8 +2,8 @@
 // Kulla 2017). `alpha` is the square of sheen roughness. A white sheen; the colour is a factor.
 #include "lib/math.wgsl"
 
-// Below this the sheen is a line at the horizon.
-const MINIMUM_SHEEN_ALPHA = 0.0025;
+// Below this the sheen is a line at the horizon, many times brighter than white.
+const MINIMUM_SHEEN_ALPHA = 0.01;
 
 fn sheen_distribution(alpha: f32, h: vec3f) -> f32 {
     let sin_2 = h.x * h.x + h.y * h.y;

@@ -27,9 +27,9 @@ pub(super) fn materials() -> Scene {
         environment: Some(Environment::even(Vec3::new(0.25, 0.28, 0.33))),
         cameras: vec![Camera::look_at(
             "front",
-            Vec3::new(0.0, 8.2, 9.4),
-            Vec3::new(0.0, 0.2, 0.15),
-            31f32.to_radians(),
+            Vec3::new(0.0, 9.4, 11.2),
+            Vec3::new(0.0, 0.0, 0.25),
+            35f32.to_radians(),
         )],
         ..Scene::default()
     };
