@@ -278,3 +278,63 @@ fn upload(gpu: &Gpu, label: &str, size: [u32; 3], format: wgpu::TextureFormat, b
     }
     texture
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Clearcoat, Iridescence, Material, Scene, Sheen, Specular, Transmission, Volume, shapes};
+
+    /// Each extension puts in the code that it needs, and a scene without any puts in none.
+    #[test]
+    fn kernels_carry_what_materials_need() {
+        let of = |material: Material| {
+            let mesh = shapes::parallelogram(Vec3::ZERO, Vec3::X, Vec3::Y, 0);
+            let instances = vec![crate::scene::Instance { mesh: 0, transform: Mat4::IDENTITY }];
+            let scene = Scene { meshes: vec![mesh], instances, materials: vec![material], ..Scene::default() };
+            features(&FlatScene::build(&scene, &mut |_, _| ()).expect("a good scene"))
+        };
+        let plain = Material::default();
+        let none = SceneFeatures::NONE;
+        assert_eq!(of(plain.clone()), none);
+        let transmission = Transmission { factor: 0.1, texture: None };
+        let volume = Some(Volume { attenuation_distance: 1.0, attenuation_color: Vec3::ONE });
+        for (material, expected) in [
+            (Material { ior: 1.4, ..plain.clone() }, SceneFeatures { specular: true, ..none }),
+            (
+                Material { specular: Specular { strength: 0.5, ..Specular::default() }, ..plain.clone() },
+                SceneFeatures { specular: true, ..none },
+            ),
+            (Material { transmission, ..plain.clone() }, SceneFeatures { transmission: true, ..none }),
+            (
+                Material { transmission, volume, ..plain.clone() },
+                SceneFeatures { transmission: true, volumes: true, specular: true, ..none },
+            ),
+            (
+                Material { transmission, volume, dispersion: 0.1, ..plain.clone() },
+                SceneFeatures { transmission: true, volumes: true, specular: true, dispersion: true, ..none },
+            ),
+            (Material { unlit: true, ..plain.clone() }, SceneFeatures { unlit: true, ..none }),
+            (
+                Material { sheen: Sheen { color: Vec3::X, ..Sheen::default() }, ..plain.clone() },
+                SceneFeatures { sheen: true, ..none },
+            ),
+            (
+                Material { clearcoat: Clearcoat { factor: 0.1, ..Clearcoat::default() }, ..plain.clone() },
+                SceneFeatures { clearcoat: true, ..none },
+            ),
+            (
+                Material { iridescence: Iridescence { factor: 0.1, ..Iridescence::default() }, ..plain.clone() },
+                SceneFeatures { iridescence: true, ..none },
+            ),
+            (
+                Material {
+                    anisotropy: crate::scene::Anisotropy { strength: 0.1, ..Default::default() },
+                    ..plain.clone()
+                },
+                SceneFeatures { anisotropy: true, ..none },
+            ),
+        ] {
+            assert_eq!(of(material), expected);
+        }
+    }
+}
