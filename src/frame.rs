@@ -42,6 +42,14 @@ pub struct Frame {
     pub pixel_filter: u32,
     /// Root of the top-level BVH in `nodes`.
     pub top_level: u32,
+    /// 0 by ray cones, 1 always the finest.
+    pub texture_levels: u32,
+    /// Unused.
+    pub padding_0: u32,
+    /// Unused.
+    pub padding_1: u32,
+    /// Unused.
+    pub padding_2: u32,
 }
 }
 

@@ -413,6 +413,10 @@ impl Renderer {
             history: self.previous_camera.is_some().into(),
             pixel_filter: self.render_params.pixel_filter,
             top_level: self.gpu_scene.top_level(),
+            texture_levels: self.render_params.texture_levels,
+            padding_0: 0,
+            padding_1: 0,
+            padding_2: 0,
         }
     }
 

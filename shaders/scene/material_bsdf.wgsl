@@ -9,7 +9,7 @@ fn dielectric_f0(eta: f32, specular_color: vec3f, strength: f32) -> vec3f {
 }
 
 // A material of the core specification. `color` is the vertex colour.
-fn core_bsdf(material: Material, uvs: vec4f, color: vec3f) -> Bsdf {
+fn core_bsdf(material: Material, uvs: TextureCoordinates, color: vec3f) -> Bsdf {
     var bsdf: Bsdf;
     let metallic_roughness = texture_read(material.metallic_roughness_texture, uvs);
     let roughness = clamp(material.roughness * metallic_roughness.g, 0.0, 1.0);
@@ -24,7 +24,7 @@ fn core_bsdf(material: Material, uvs: vec4f, color: vec3f) -> Bsdf {
 
 // Adds what the extensions have. Seen in air from the front; a medium changes `eta` and `f0` (scene/media.wgsl).
 // Anisotropy and the clearcoat's normal are set where the surface's tangents are known.
-fn extend_bsdf(bsdf: ptr<function, Bsdf>, extensions: MaterialExtensions, uvs: vec4f) {
+fn extend_bsdf(bsdf: ptr<function, Bsdf>, extensions: MaterialExtensions, uvs: TextureCoordinates) {
     if scene_has_specular {
         (*bsdf).f90 = extensions.specular * texture_read(extensions.specular_texture, uvs).a;
     }
@@ -57,9 +57,9 @@ struct Anisotropy {
 }
 
 // KHR_materials_anisotropy: the direction in which highlights are stretched.
-fn load_anisotropy(extensions: MaterialExtensions, uvs: vec4f) -> Anisotropy {
+fn load_anisotropy(extensions: MaterialExtensions, uvs: TextureCoordinates) -> Anisotropy {
     let turn = extensions.anisotropy_direction;
-    if !scene_has_textures || extensions.anisotropy_texture.width == 0u {
+    if !scene_has_textures || !texture_exists(extensions.anisotropy_texture) {
         return Anisotropy(turn, extensions.anisotropy);
     }
     let texel = texture_read(extensions.anisotropy_texture, uvs).rgb;

@@ -50,7 +50,7 @@ override scene_has_specular: bool = true;
 @group(0) @binding(21) var material_extensions: texture_2d<u32>;
 
 fn extension_texel(material: u32, texel: u32) -> vec4u {
-    return textureLoad(material_extensions, data_texel(material * 40u + texel), 0);
+    return textureLoad(material_extensions, data_texel(material * 29u + texel), 0);
 }
 
 fn extension_factors(material: u32, texel: u32) -> vec4f {
@@ -58,11 +58,9 @@ fn extension_factors(material: u32, texel: u32) -> vec4f {
 }
 
 fn extension_slot(material: u32, index: u32) -> TextureSlot {
-    let texel = 7u + 3u * index;
-    let u = extension_texel(material, texel);
-    let v = extension_texel(material, texel + 1u);
-    let place = extension_texel(material, texel + 2u);
-    return TextureSlot(bitcast<vec3f>(u.xyz), u.w, bitcast<vec3f>(v.xyz), v.w, place.x, place.y, place.z, place.w);
+    let u = extension_texel(material, 7u + 2u * index);
+    let v = extension_texel(material, 8u + 2u * index);
+    return TextureSlot(bitcast<vec3f>(u.xyz), u.w, bitcast<vec3f>(v.xyz), v.w);
 }
 
 fn load_extensions(material: u32) -> MaterialExtensions {

@@ -1,5 +1,6 @@
 // What a ray hit, ready for shading.
 #include "scene/bvh.wgsl"
+#include "scene/ray_cone.wgsl"
 #include "scene/material_bsdf.wgsl"
 
 struct Surface {
@@ -12,6 +13,7 @@ struct Surface {
     instance: u32,
     triangle: u32,
     light: u32, // index of the light this surface is, or NONE
+    footprint: f32, // width of the cone that met it, in metres
     is_front: bool,
     material: u32,
     // Of transmissive surfaces (scene/media.wgsl):
@@ -75,15 +77,15 @@ fn triangle_point(instance: u32, triangle: u32, uv: vec2f) -> vec3f {
 }
 
 // Radiance that a point of an emissive triangle sends out of its front, at a cosine to its normal; black where its alpha
-// mask cuts it away. A clearcoat dims it (KHR_materials_clearcoat), here by the mesh's own normal, so that a light is the
-// same to the ray that hits it and to the sample that chose it.
+// mask cuts it away. A clearcoat dims it (KHR_materials_clearcoat). Read at level 0 however it was found, and dimmed by the
+// mesh's own normal, so that a light is the same to the ray that hits it and to the sample that chose it.
 fn emitted_radiance(triangle: u32, uv: vec2f, cosine: f32) -> vec3f {
     let t = load_triangle(triangle);
     if scene_has_alpha_masks && (t.flags & TRIANGLE_ALPHA_MASK) != 0u && !passes_alpha(triangle, uv) {
         return vec3f(0.0);
     }
     let material = load_material(t.material);
-    let uvs = triangle_uvs(triangle, uv);
+    let uvs = texture_finest(triangle_uvs(triangle, uv));
     var radiance = material.emissive * texture_read(material.emissive_texture, uvs).rgb;
     if scene_has_clearcoat {
         let extensions = load_extensions(t.material);
@@ -126,9 +128,9 @@ fn shading_frame(triangle: u32, uv: vec2f) -> ShadingFrame {
 }
 
 // The frame's normal, bent by a normal map; unit.
-fn mapped_normal(frame: ShadingFrame, map: TextureSlot, scale: f32, uvs: vec4f) -> vec3f {
+fn mapped_normal(frame: ShadingFrame, map: TextureSlot, scale: f32, uvs: TextureCoordinates) -> vec3f {
     let n = normalize(frame.normal);
-    if !scene_has_textures || !frame.has_tangents || map.width == 0u {
+    if !scene_has_textures || !frame.has_tangents || !texture_exists(map) {
         return n;
     }
     let texel = texture_read(map, uvs).xyz * 2.0 - 1.0;
@@ -137,7 +139,7 @@ fn mapped_normal(frame: ShadingFrame, map: TextureSlot, scale: f32, uvs: vec4f) 
 }
 
 // The normal that a material is shaded with, in its mesh's space.
-fn shading_normal(triangle: u32, uv: vec2f, uvs: vec4f) -> vec3f {
+fn shading_normal(triangle: u32, uv: vec2f, uvs: TextureCoordinates) -> vec3f {
     let material = load_material(load_triangle(triangle).material);
     return mapped_normal(shading_frame(triangle, uv), material.normal_texture, material.normal_scale, uvs);
 }
@@ -156,9 +158,10 @@ fn viewed_normal(instance: u32, normal: vec3f, side: f32, wo: vec3f) -> vec3f {
     return n;
 }
 
-// The surface at a point of a triangle, seen from `wo` (unit, towards the viewer).
-fn load_surface(instance: u32, triangle: u32, uv: vec2f, wo: vec3f) -> Surface {
-    let uvs = triangle_uvs(triangle, uv);
+// The surface at a point of a triangle, seen from `wo` (unit, towards the viewer) by a cone that is `footprint` metres
+// wide there.
+fn load_surface(instance: u32, triangle: u32, uv: vec2f, wo: vec3f, footprint: f32) -> Surface {
+    let uvs = texture_coordinates(instance, triangle, uv, wo, footprint);
     let triangle_record = load_triangle(triangle);
     let material = load_material(triangle_record.material);
     var surface: Surface;
@@ -167,6 +170,7 @@ fn load_surface(instance: u32, triangle: u32, uv: vec2f, wo: vec3f) -> Surface {
     surface.instance = instance;
     surface.triangle = triangle;
     surface.material = triangle_record.material;
+    surface.footprint = footprint;
     surface.light = triangle_record.light;
     if scene_has_instances && triangle_record.light != NONE {
         surface.light += instance_first_light(instance);
@@ -190,7 +194,8 @@ fn load_surface(instance: u32, triangle: u32, uv: vec2f, wo: vec3f) -> Surface {
 }
 
 // Adds what the material has from glTF's extensions.
-fn extend_surface(surface: ptr<function, Surface>, shading: ShadingFrame, uvs: vec4f, side: f32) {
+fn extend_surface(surface: ptr<function, Surface>, shading: ShadingFrame, uvs: TextureCoordinates,
+    side: f32) {
     let extensions = load_extensions((*surface).material);
     var bsdf = (*surface).bsdf;
     extend_bsdf(&bsdf, extensions, uvs);

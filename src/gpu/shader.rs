@@ -98,6 +98,12 @@ macro_rules! scene_features {
 scene_features! {
     /// Any texture.
     textures,
+    /// A second texture array.
+    textures_1,
+    /// A third texture array.
+    textures_2,
+    /// A fourth texture array.
+    textures_3,
     /// Any triangle whose alpha has to be tested.
     alpha_masks,
     /// An environment.

@@ -69,6 +69,7 @@ pub mod scene_functions {
     pub const OFFSET_ORIGIN: u32 = 7;
     pub const SHADING_NORMAL: u32 = 8;
     pub const SHADOW_RAY: u32 = 9;
+    pub const FOOTPRINT: u32 = 20;
 }
 
 impl TestInput {

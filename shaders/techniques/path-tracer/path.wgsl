@@ -63,6 +63,7 @@ fn scattered_radiance(start: Surface, direct: bool, rng: ptr<function, Rng>) -> 
     var throughput = vec3f(1.0);
     var media = media_none();
     var channel = ALL_CHANNELS;
+    var spread = camera_spread(frame.camera);
     for (var depth = 1u; depth <= frame.max_depth; depth += 1u) {
         let counts = direct || depth > 1u;
         channel = choose_channel(surface, channel, &throughput, rng);
@@ -99,7 +100,8 @@ fn scattered_radiance(start: Surface, direct: bool, rng: ptr<function, Rng>) -> 
             }
             break;
         }
-        surface = load_surface(hit.instance, hit.triangle, hit.uv, -wi);
+        spread = scattered_spread(surface.instance, surface.triangle, spread, surface.footprint, pdf);
+        surface = load_surface(hit.instance, hit.triangle, hit.uv, -wi, surface.footprint + spread * hit.t);
         if scene_has_unlit && surface.light == NONE {
             radiance += throughput * surface.emission;
         } else if counts && surface.light != NONE {

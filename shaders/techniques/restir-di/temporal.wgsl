@@ -71,9 +71,7 @@ fn reuse_pixel(pixel: vec2u) {
         keep(pixel);
         return;
     }
-    let uv = bitcast<vec2f>(seen.zw);
-    let previous = load_surface(seen.x, seen.y, uv,
-        direction_to_camera(frame.previous_camera, triangle_point(seen.x, seen.y, uv)));
+    let previous = load_seen(frame.previous_camera, seen.x, seen.y, bitcast<vec2f>(seen.zw));
     if !is_same_surface(surface, previous) {
         keep(pixel);
         return;

@@ -1,20 +1,20 @@
 //! What materials have from glTF's extensions.
 
-use super::atlas::Rectangle;
-use super::materials::{SRGB, slot};
+use super::materials::{Find, slot};
+use super::mips::Texels;
 use crate::error::{Error, Result};
 use crate::scene::gpu_types::{MATERIAL_UNLIT, MATERIAL_VOLUME, MaterialExtensions};
 use crate::scene::{Material, Scene, Volume};
 use glam::{Vec2, Vec3};
 
 /// One record a material, or none at all where no material uses an extension.
-pub(super) fn flatten(scene: &Scene, rectangles: &[Rectangle]) -> Result<Vec<MaterialExtensions>> {
+pub(super) fn flatten(scene: &Scene, find: Find) -> Result<Vec<MaterialExtensions>> {
     let all = scene.materials.iter().enumerate().map(|(i, material)| {
-        flatten_one(material, scene, rectangles)
+        flatten_one(material, scene, find)
             .map_err(|what| Error::bad_value(format!("material {i} '{}'", material.name), what))
     });
     let all: Vec<_> = all.collect::<Result<_>>()?;
-    let none = flatten_one(&Material::default(), scene, rectangles)
+    let none = flatten_one(&Material::default(), scene, find)
         .map_err(|what| Error::bad_value("the default material", what))?;
     Ok(if all.iter().all(|one| *one == none) { Vec::new() } else { all })
 }
@@ -22,12 +22,12 @@ pub(super) fn flatten(scene: &Scene, rectangles: &[Rectangle]) -> Result<Vec<Mat
 fn flatten_one(
     material: &Material,
     scene: &Scene,
-    rectangles: &[Rectangle],
+    find: Find,
 ) -> std::result::Result<MaterialExtensions, String> {
     let Material { specular, transmission, clearcoat, sheen, anisotropy, iridescence, .. } = material;
     let flags =
         if material.unlit { MATERIAL_UNLIT } else { 0 } | if material.bounds_a_medium() { MATERIAL_VOLUME } else { 0 };
-    let slot = |texture, srgb| slot(texture, srgb, scene, rectangles);
+    let mut slot = |texture, texels| slot(texture, texels, scene, find);
     let flat = MaterialExtensions {
         specular_color: specular.color,
         specular: specular.strength,
@@ -50,17 +50,17 @@ fn flatten_one(
         padding_0: 0,
         padding_1: 0,
         padding_2: 0,
-        specular_texture: slot(specular.texture, 0)?,
-        specular_color_texture: slot(specular.color_texture, SRGB)?,
-        transmission_texture: slot(transmission.texture, 0)?,
-        clearcoat_texture: slot(clearcoat.texture, 0)?,
-        clearcoat_roughness_texture: slot(clearcoat.roughness_texture, 0)?,
-        clearcoat_normal_texture: slot(clearcoat.normal_texture, 0)?,
-        sheen_color_texture: slot(sheen.color_texture, SRGB)?,
-        sheen_roughness_texture: slot(sheen.roughness_texture, 0)?,
-        anisotropy_texture: slot(anisotropy.texture, 0)?,
-        iridescence_texture: slot(iridescence.texture, 0)?,
-        iridescence_thickness_texture: slot(iridescence.thickness_texture, 0)?,
+        specular_texture: slot(specular.texture, Texels::Data)?,
+        specular_color_texture: slot(specular.color_texture, Texels::Color)?,
+        transmission_texture: slot(transmission.texture, Texels::Data)?,
+        clearcoat_texture: slot(clearcoat.texture, Texels::Data)?,
+        clearcoat_roughness_texture: slot(clearcoat.roughness_texture, Texels::Data)?,
+        clearcoat_normal_texture: slot(clearcoat.normal_texture, Texels::Normal)?,
+        sheen_color_texture: slot(sheen.color_texture, Texels::Color)?,
+        sheen_roughness_texture: slot(sheen.roughness_texture, Texels::Data)?,
+        anisotropy_texture: slot(anisotropy.texture, Texels::Data)?,
+        iridescence_texture: slot(iridescence.texture, Texels::Data)?,
+        iridescence_thickness_texture: slot(iridescence.thickness_texture, Texels::Data)?,
     };
     if flat.factors().iter().any(|f| !f.is_finite()) {
         return Err("a factor of an extension is not finite".into());
@@ -82,13 +82,13 @@ mod tests {
     use crate::scene::{Clearcoat, Transmission};
 
     fn of(material: Material) -> MaterialExtensions {
-        flatten(&Scene { materials: vec![material], ..Scene::default() }, &[]).expect("a good material")[0]
+        flatten(&Scene { materials: vec![material], ..Scene::default() }, &mut |_, _| None).expect("a good material")[0]
     }
 
     #[test]
     fn plain_materials_have_none() {
         let scene = Scene { materials: vec![Material::default(); 3], ..Scene::default() };
-        assert_eq!(flatten(&scene, &[]).expect("good materials"), []);
+        assert_eq!(flatten(&scene, &mut |_, _| None).expect("good materials"), []);
     }
 
     #[test]
@@ -113,6 +113,6 @@ mod tests {
     fn bad_factors_are_errors() {
         let clearcoat = Clearcoat { roughness: f32::NAN, ..Clearcoat::default() };
         let scene = Scene { materials: vec![Material { clearcoat, ..Material::default() }], ..Scene::default() };
-        assert!(flatten(&scene, &[]).is_err());
+        assert!(flatten(&scene, &mut |_, _| None).is_err());
     }
 }
