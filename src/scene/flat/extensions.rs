@@ -19,11 +19,7 @@ pub(super) fn flatten(scene: &Scene, find: Find) -> Result<Vec<MaterialExtension
     Ok(if all.iter().all(|one| *one == none) { Vec::new() } else { all })
 }
 
-fn flatten_one(
-    material: &Material,
-    scene: &Scene,
-    find: Find,
-) -> std::result::Result<MaterialExtensions, String> {
+fn flatten_one(material: &Material, scene: &Scene, find: Find) -> std::result::Result<MaterialExtensions, String> {
     let Material { specular, transmission, clearcoat, sheen, anisotropy, iridescence, .. } = material;
     let flags =
         if material.unlit { MATERIAL_UNLIT } else { 0 } | if material.bounds_a_medium() { MATERIAL_VOLUME } else { 0 };
