@@ -91,7 +91,7 @@ fn scattered_radiance(start: Surface, direct: bool, rng: ptr<function, Rng>) -> 
             throughput /= q;
         }
 
-        let hit = traverse(surface_ray_origin(surface, wi), wi, 3.0e38, false);
+        let hit = traverse(ray_origin(surface, wi), wi, 3.0e38, false);
         throughput *= surface_transmittance(surface, wi, hit.t);
         media = media_after(media, surface, wi);
         if hit.triangle == NONE {
