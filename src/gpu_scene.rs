@@ -7,7 +7,10 @@ use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
 use crate::scene::FlatScene;
 use crate::scene::flat::{FlatInstance, TextureArray, levels};
-use crate::scene::gpu_types::{BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK};
+use crate::scene::gpu_types::{
+    BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, MATERIAL_UNLIT, MATERIAL_VOLUME, MaterialExtensions,
+    NONE, TRIANGLE_ALPHA_MASK,
+};
 use glam::{Mat4, Quat, Vec3, Vec4};
 
 /// Triangles in the first of the two buffers: 128 MiB, what every WebGPU device can bind. As in `shaders/scene/data.wgsl`.
@@ -25,6 +28,7 @@ pub struct GpuScene {
     lights: wgpu::Buffer,
     attributes: DataTexture,
     materials: DataTexture,
+    material_extensions: DataTexture,
     instances: DataTexture,
     /// Object to world of each instance in the frame that is uploaded.
     transforms: Vec<Mat4>,
@@ -81,6 +85,7 @@ impl GpuScene {
             ],
             attributes: DataTexture::new(gpu, "attributes", &scene.attributes)?,
             materials: DataTexture::new(gpu, "materials", &scene.materials)?,
+            material_extensions: DataTexture::new(gpu, "material extensions", &scene.material_extensions)?,
             instances: DataTexture::new(gpu, "instances", &instance_records(scene, &transforms, &transforms))?,
             transforms,
             top_level: scene.root(),
@@ -172,6 +177,7 @@ impl GpuScene {
         recorder.share("lights", &self.lights);
         recorder.share("attributes", &self.attributes.view);
         recorder.share("materials", &self.materials.view);
+        recorder.share("material_extensions", &self.material_extensions.view);
         recorder.share("instances", &self.instances.view);
         for (name, textures) in TEXTURE_ARRAYS.into_iter().zip(&self.textures) {
             recorder.share(name, textures);
@@ -182,6 +188,7 @@ impl GpuScene {
 }
 
 fn features(scene: &FlatScene) -> SceneFeatures {
+    let any = |has: fn(&MaterialExtensions) -> bool| scene.material_extensions.iter().any(has);
     SceneFeatures {
         textures: !scene.textures.is_empty(),
         textures_1: scene.textures.len() > 1,
@@ -192,6 +199,24 @@ fn features(scene: &FlatScene) -> SceneFeatures {
         punctual_lights: scene.lights.iter().any(|l| l.kind != LIGHT_TRIANGLE && l.kind != LIGHT_ENVIRONMENT),
         instances: scene.has_top_level(),
         many_triangles: scene.triangles.len() > FIRST_TRIANGLES,
+        transmission: any(|m| m.transmission > 0.0),
+        volumes: any(|m| m.flags & MATERIAL_VOLUME != 0),
+        dispersion: any(|m| m.flags & MATERIAL_VOLUME != 0 && m.dispersion > 0.0),
+        unlit: any(|m| m.flags & MATERIAL_UNLIT != 0),
+        anisotropy: any(|m| m.anisotropy > 0.0),
+        // Where a medium is outside, index 1.5 reflects something else.
+        specular: any(|m| {
+            m.ior != 1.5
+                || m.specular != 1.0
+                || m.specular_color != Vec3::ONE
+                || m.slots()[..2].iter().any(|slot| slot.read().is_some())
+                || m.flags & MATERIAL_VOLUME != 0
+        }),
+        sheen: any(|m| m.sheen_color != Vec3::ZERO),
+        clearcoat: any(|m| m.clearcoat > 0.0),
+        iridescence: any(|m| m.iridescence > 0.0),
+        energy_compensation: false,
+        conserving_mix: false,
     }
 }
 
@@ -278,4 +303,64 @@ fn write(gpu: &Gpu, texture: &wgpu::Texture, level: u32, layer: u32, texels: &[u
         wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: Some(height) },
         wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
     );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Clearcoat, Iridescence, Material, Scene, Sheen, Specular, Transmission, Volume, shapes};
+
+    /// Each extension puts in the code that it needs, and a scene without any puts in none.
+    #[test]
+    fn kernels_carry_what_materials_need() {
+        let of = |material: Material| {
+            let mesh = shapes::parallelogram(Vec3::ZERO, Vec3::X, Vec3::Y, 0);
+            let instances = vec![crate::scene::Instance { mesh: 0, transform: Mat4::IDENTITY }];
+            let scene = Scene { meshes: vec![mesh], instances, materials: vec![material], ..Scene::default() };
+            features(&FlatScene::build(&scene, &mut |_, _| ()).expect("a good scene"))
+        };
+        let plain = Material::default();
+        let none = SceneFeatures::NONE;
+        assert_eq!(of(plain.clone()), none);
+        let transmission = Transmission { factor: 0.1, texture: None };
+        let volume = Some(Volume { attenuation_distance: 1.0, attenuation_color: Vec3::ONE });
+        for (material, expected) in [
+            (Material { ior: 1.4, ..plain.clone() }, SceneFeatures { specular: true, ..none }),
+            (
+                Material { specular: Specular { strength: 0.5, ..Specular::default() }, ..plain.clone() },
+                SceneFeatures { specular: true, ..none },
+            ),
+            (Material { transmission, ..plain.clone() }, SceneFeatures { transmission: true, ..none }),
+            (
+                Material { transmission, volume, ..plain.clone() },
+                SceneFeatures { transmission: true, volumes: true, specular: true, ..none },
+            ),
+            (
+                Material { transmission, volume, dispersion: 0.1, ..plain.clone() },
+                SceneFeatures { transmission: true, volumes: true, specular: true, dispersion: true, ..none },
+            ),
+            (Material { unlit: true, ..plain.clone() }, SceneFeatures { unlit: true, ..none }),
+            (
+                Material { sheen: Sheen { color: Vec3::X, ..Sheen::default() }, ..plain.clone() },
+                SceneFeatures { sheen: true, ..none },
+            ),
+            (
+                Material { clearcoat: Clearcoat { factor: 0.1, ..Clearcoat::default() }, ..plain.clone() },
+                SceneFeatures { clearcoat: true, ..none },
+            ),
+            (
+                Material { iridescence: Iridescence { factor: 0.1, ..Iridescence::default() }, ..plain.clone() },
+                SceneFeatures { iridescence: true, ..none },
+            ),
+            (
+                Material {
+                    anisotropy: crate::scene::Anisotropy { strength: 0.1, ..Default::default() },
+                    ..plain.clone()
+                },
+                SceneFeatures { anisotropy: true, ..none },
+            ),
+        ] {
+            assert_eq!(of(material), expected);
+        }
+    }
 }

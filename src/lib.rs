@@ -36,6 +36,7 @@ pub fn gpu_layouts() -> Vec<scene::gpu_types::Layout> {
         types::Instance::LAYOUT,
         types::TextureSlot::LAYOUT,
         types::Material::LAYOUT,
+        types::MaterialExtensions::LAYOUT,
         types::Light::LAYOUT,
         types::CameraView::LAYOUT,
         frame::Frame::LAYOUT,

@@ -338,6 +338,7 @@ impl Renderer {
         // Rays are counted by the frame, what was left out since the film began.
         recorder.encoder.clear_buffer(&self.film.counters, 0, if restart { None } else { Some(4) });
         self.gpu_scene.share(&mut recorder);
+        self.render_params.specialise(&mut recorder.features);
         self.film.share(&mut recorder);
         recorder.share("frame", &self.frame_uniform);
         recorder.share("visibility", &self.visibility[parity]);
@@ -468,6 +469,7 @@ impl Renderer {
     pub async fn read_auxiliary(&self) -> Result<Auxiliary> {
         let mut recorder = Recorder::new(&self.gpu, None);
         self.gpu_scene.share(&mut recorder);
+        self.render_params.specialise(&mut recorder.features);
         recorder.share("frame", &self.frame_uniform);
         recorder.share("visibility", &self.visibility[(self.frame_index.wrapping_sub(1) & 1) as usize]);
         record_auxiliary(&mut recorder, &self.albedo_depth, &self.normal, self.size())?;

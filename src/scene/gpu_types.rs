@@ -2,7 +2,7 @@
 //!
 //! `gpu_struct!` registers a struct's size and field offsets in its `LAYOUT`; [`crate::gpu_layouts`] lists them all.
 
-use glam::{Mat4, Vec3, Vec4};
+use glam::{Mat4, Vec2, Vec3, Vec4};
 
 /// Size and field offsets of one Rust struct with a WGSL twin.
 #[derive(Debug, Clone, Copy)]
@@ -230,6 +230,106 @@ pub struct Material {
     /// Emission, sRGB.
     pub emissive_texture: TextureSlot,
 }
+}
+
+/// [`MaterialExtensions::flags`]: KHR_materials_unlit.
+pub const MATERIAL_UNLIT: u32 = 1;
+/// [`MaterialExtensions::flags`]: the surface bounds a medium (KHR_materials_volume).
+pub const MATERIAL_VOLUME: u32 = 2;
+
+gpu_struct! {
+/// What glTF's extensions add to a [`Material`]: 464 bytes, 29 texels of the data texture `material_extensions`. A scene
+/// that uses none has none.
+pub struct MaterialExtensions {
+    /// Multiplies the dielectric's reflectance at normal incidence.
+    pub specular_color: Vec3,
+    /// Strength of the dielectric's reflection.
+    pub specular: f32,
+    /// Absorption coefficient of the medium below, 1/m.
+    pub absorption: Vec3,
+    /// Share of light that passes through.
+    pub transmission: f32,
+    /// Sheen colour.
+    pub sheen_color: Vec3,
+    /// Sheen roughness.
+    pub sheen_roughness: f32,
+    /// Index of refraction; 0 for a perfect reflector.
+    pub ior: f32,
+    /// 20 over the Abbe number.
+    pub dispersion: f32,
+    /// Strength of the clearcoat.
+    pub clearcoat: f32,
+    /// Roughness of the clearcoat.
+    pub clearcoat_roughness: f32,
+    /// Cosine and sine of the anisotropy's rotation from the tangent.
+    pub anisotropy_direction: Vec2,
+    /// Strength of the anisotropy.
+    pub anisotropy: f32,
+    /// Normal-map scale of the clearcoat.
+    pub clearcoat_normal_scale: f32,
+    /// Strength of the thin film.
+    pub iridescence: f32,
+    /// Index of refraction of the film.
+    pub film_ior: f32,
+    /// Nanometres where the thickness texture is 0.
+    pub film_thickness_minimum: f32,
+    /// Nanometres where it is 1.
+    pub film_thickness_maximum: f32,
+    /// `MATERIAL_*` bits.
+    pub flags: u32,
+    /// Unused.
+    pub padding_0: u32,
+    /// Unused.
+    pub padding_1: u32,
+    /// Unused.
+    pub padding_2: u32,
+    /// Alpha: specular strength.
+    pub specular_texture: TextureSlot,
+    /// Specular colour, sRGB.
+    pub specular_color_texture: TextureSlot,
+    /// Red: transmission.
+    pub transmission_texture: TextureSlot,
+    /// Red: clearcoat.
+    pub clearcoat_texture: TextureSlot,
+    /// Green: clearcoat roughness.
+    pub clearcoat_roughness_texture: TextureSlot,
+    /// Tangent-space normals of the clearcoat.
+    pub clearcoat_normal_texture: TextureSlot,
+    /// Sheen colour, sRGB.
+    pub sheen_color_texture: TextureSlot,
+    /// Alpha: sheen roughness.
+    pub sheen_roughness_texture: TextureSlot,
+    /// Red and green a direction, blue the strength of the anisotropy.
+    pub anisotropy_texture: TextureSlot,
+    /// Red: strength of the film.
+    pub iridescence_texture: TextureSlot,
+    /// Green: thickness of the film.
+    pub iridescence_thickness_texture: TextureSlot,
+}
+}
+
+impl MaterialExtensions {
+    /// Every texture slot, used or not.
+    pub fn slots(&self) -> [&TextureSlot; 11] {
+        [
+            &self.specular_texture,
+            &self.specular_color_texture,
+            &self.transmission_texture,
+            &self.clearcoat_texture,
+            &self.clearcoat_roughness_texture,
+            &self.clearcoat_normal_texture,
+            &self.sheen_color_texture,
+            &self.sheen_roughness_texture,
+            &self.anisotropy_texture,
+            &self.iridescence_texture,
+            &self.iridescence_thickness_texture,
+        ]
+    }
+
+    /// Every factor, for checks; the flags among them read as a number next to zero.
+    pub fn factors(&self) -> &[f32] {
+        bytemuck::cast_slice(&bytemuck::bytes_of(self)[..std::mem::offset_of!(MaterialExtensions, specular_texture)])
+    }
 }
 
 /// [`Light::kind`]: an emissive triangle.

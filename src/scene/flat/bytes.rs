@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 const _: () = assert!(cfg!(target_endian = "little"), "arrays are copied as they lie in memory");
 
 const MAGIC: [u8; 4] = *b"RSTR";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const PREFIX: usize = 16;
 const ALIGNMENT: usize = 16;
 
@@ -42,6 +42,7 @@ struct Sections {
     meshes: usize,
     instances: usize,
     materials: usize,
+    material_extensions: usize,
     lights: usize,
     environment_texels: usize,
 }
@@ -95,6 +96,7 @@ impl FlatScene {
         section(bytemuck::cast_slice(&self.meshes));
         section(bytemuck::cast_slice(&self.instances));
         section(bytemuck::cast_slice(&self.materials));
+        section(bytemuck::cast_slice(&self.material_extensions));
         section(bytemuck::cast_slice(&self.lights));
         for array in &self.textures {
             section(&array.texels);
@@ -127,8 +129,17 @@ impl FlatScene {
         }
         let header = reader.take(u32::from_le_bytes(word(2)) as usize, "header")?;
         let header: Header = serde_json::from_slice(header).map_err(|e| bad("header", e.to_string()))?;
-        let Sections { nodes, triangles, attributes, meshes, instances, materials, lights, environment_texels } =
-            header.sections;
+        let Sections {
+            nodes,
+            triangles,
+            attributes,
+            meshes,
+            instances,
+            materials,
+            material_extensions,
+            lights,
+            environment_texels,
+        } = header.sections;
         let scene = FlatScene {
             name: header.name,
             nodes: reader.array(nodes, "nodes")?,
@@ -137,6 +148,7 @@ impl FlatScene {
             meshes: reader.array(meshes, "meshes")?,
             instances: reader.array(instances, "instances")?,
             materials: reader.array(materials, "materials")?,
+            material_extensions: reader.array(material_extensions, "material extensions")?,
             lights: reader.array(lights, "lights")?,
             first_punctual: header.first_punctual,
             motions: header.motions.into_iter().map(MotionRecord::into_motion).collect(),
@@ -232,6 +244,7 @@ fn header_of(scene: &FlatScene) -> Header {
             meshes: scene.meshes.len(),
             instances: scene.instances.len(),
             materials: scene.materials.len(),
+            material_extensions: scene.material_extensions.len(),
             lights: scene.lights.len(),
             environment_texels: scene.environment.as_ref().map_or(0, |e| e.radiance.len()),
         },

@@ -1,6 +1,7 @@
 //! A scene as plain arrays with a BVH: what is uploaded, sent from a Worker to the page, and kept to rebuild a lost device.
 
 mod bytes;
+mod extensions;
 mod framing;
 pub(crate) mod levels;
 mod lights;
@@ -13,7 +14,9 @@ mod validate;
 
 pub(super) use triangles::face_normal;
 
-use super::gpu_types::{BvhNode, EnvironmentTexel, Light, Material, NONE, Triangle, TriangleAttributes};
+use super::gpu_types::{
+    BvhNode, EnvironmentTexel, Light, Material, MaterialExtensions, NONE, Triangle, TriangleAttributes,
+};
 use super::{Camera, LightMotion, MAX_COORDINATE, Projection, PunctualKind, Scene, bvh};
 use crate::error::{Error, Result};
 use glam::{Mat4, Vec3};
@@ -166,6 +169,8 @@ pub struct FlatScene {
     pub instances: Vec<FlatInstance>,
     /// At least one.
     pub materials: Vec<Material>,
+    /// What glTF's extensions add to each material; empty where no material uses one.
+    pub material_extensions: Vec<MaterialExtensions>,
     /// With alias table; the environment, if any, is the last. May be empty.
     pub lights: Vec<Light>,
     /// Index in `lights` of the first punctual light; they follow in the order of [`Scene::lights`].
@@ -202,14 +207,14 @@ impl FlatScene {
 
         // Once to learn which images there are and what they mean, once to say where they went.
         let mut images = textures::Images::new(scene)?;
-        materials::flatten(scene, &mut |texture, texels| {
-            images.ask(texture, texels).map(|_| textures::Place::default())
-        })?;
+        let mut ask = |texture, texels| images.ask(texture, texels).map(|_| textures::Place::default());
+        materials::flatten(scene, &mut ask)?;
+        extensions::flatten(scene, &mut ask)?;
         let mut report = |fraction| progress(0.8 + 0.1 * fraction, "making mip levels");
         let (textures, places) = images.pack(&mut warnings, &mut report)?;
-        let materials = materials::flatten(scene, &mut |texture, texels| {
-            images.ask(texture, texels).and_then(|image| places.get(image).copied())
-        })?;
+        let mut find = |texture, texels| images.ask(texture, texels).and_then(|image| places.get(image).copied());
+        let materials = materials::flatten(scene, &mut find)?;
+        let material_extensions = extensions::flatten(scene, &mut find)?;
 
         progress(0.9, "weighing lights");
         let environment = match &scene.environment {
@@ -237,6 +242,7 @@ impl FlatScene {
             meshes,
             instances,
             materials,
+            material_extensions,
             lights,
             first_punctual,
             motions: scene.motions.clone(),
@@ -293,6 +299,7 @@ impl FlatScene {
             + size_of_val(&self.attributes[..])
             + size_of::<super::gpu_types::Instance>() * self.instances.len()
             + size_of_val(&self.materials[..])
+            + size_of_val(&self.material_extensions[..])
             + size_of_val(&self.lights[..]);
         let textures: usize = self.textures.iter().map(|array| array.texels.len()).sum();
         (arrays + textures + environment) as u64
