@@ -3,7 +3,7 @@
 use crate::gpu_struct;
 use crate::scene::gpu_types::CameraView;
 use crate::scene::{Camera, Projection};
-use glam::{Mat4, UVec2, Vec3};
+use glam::{Mat4, UVec2, Vec2, Vec3};
 
 gpu_struct! {
 /// One frame, as `shaders/scene/bindings.wgsl` declares it.
@@ -40,8 +40,12 @@ pub struct Frame {
     pub history: u32,
     /// 0 box, 1 centre.
     pub pixel_filter: u32,
-    /// Unused.
-    pub padding: u32,
+    /// Index of the sun among the lights, or `NONE`.
+    pub sun_light: u32,
+    /// Cosine and sine of the turn of environment and sun about +Y.
+    pub environment_turn: Vec2,
+    /// The same in the previous frame.
+    pub previous_environment_turn: Vec2,
 }
 }
 

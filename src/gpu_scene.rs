@@ -1,12 +1,14 @@
 //! The uploaded scene: the buffers and textures of bind group 0, all but the frame uniform.
 
+use crate::environment_pyramid::EnvironmentPyramid;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
 use crate::scene::FlatScene;
-use crate::scene::gpu_types::{LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK};
-use glam::{Quat, Vec3};
+use crate::scene::flat::FlatEnvironment;
+use crate::scene::gpu_types::{LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK};
+use glam::{Quat, UVec2, Vec3};
 
 /// A [`FlatScene`] on the device.
 #[derive(Debug)]
@@ -18,6 +20,10 @@ pub struct GpuScene {
     atlas: wgpu::TextureView,
     environment_radiance: wgpu::TextureView,
     environment_alias: wgpu::TextureView,
+    /// What stands in for a pyramid that there is not.
+    no_pyramid: wgpu::TextureView,
+    /// Made when the environment is to be sampled by it.
+    pyramid: Option<EnvironmentPyramid>,
     /// The punctual lights as they are uploaded now, from `first_punctual` on.
     punctual: Vec<Light>,
     first_punctual: u32,
@@ -57,8 +63,7 @@ impl GpuScene {
             None => (black.0, &black.1, &black.2),
         };
         let first = scene.first_punctual as usize;
-        let punctual: Vec<Light> =
-            scene.lights.iter().skip(first).filter(|l| l.kind != LIGHT_ENVIRONMENT).copied().collect();
+        let punctual: Vec<Light> = scene.lights.iter().skip(first).filter(|l| !is_distant(l)).copied().collect();
         Ok(GpuScene {
             nodes: gpu.storage_of("nodes", &scene.nodes)?,
             triangles: gpu.storage_of("triangles", &scene.triangles)?,
@@ -88,6 +93,8 @@ impl GpuScene {
                 bytemuck::cast_slice(alias),
             )
             .create_view(&Default::default()),
+            no_pyramid: gpu.texture("no pyramid", UVec2::ONE, wgpu::TextureFormat::Rgba32Float),
+            pyramid: None,
             rest_positions: punctual.iter().map(|l| l.position).collect(),
             punctual,
             first_punctual: scene.first_punctual,
@@ -115,6 +122,31 @@ impl GpuScene {
         gpu.queue.write_buffer(&self.lights, offset, bytemuck::cast_slice(&self.punctual));
     }
 
+    /// Whether the environment is sampled by its pyramid, which [`GpuScene::record`] then makes, or by its alias table.
+    pub fn sample_by_pyramid(&mut self, gpu: &Gpu, by_pyramid: bool) {
+        let size = self.environment_radiance.texture().size();
+        if !by_pyramid || !self.features.environment {
+            self.pyramid = None;
+        } else if self.pyramid.is_none() {
+            self.pyramid = Some(EnvironmentPyramid::new(gpu, size.width, size.height));
+        }
+        self.features.environment_pyramid = self.pyramid.is_some();
+    }
+
+    /// Replaces the environment's radiance and alias table by those of a map of the same size.
+    pub(crate) fn update_environment(&self, gpu: &Gpu, environment: &FlatEnvironment) {
+        write(gpu, self.environment_radiance.texture(), bytemuck::cast_slice(&environment.radiance));
+        write(gpu, self.environment_alias.texture(), bytemuck::cast_slice(&environment.alias));
+    }
+
+    /// What has to be made before the scene can be rendered.
+    ///
+    /// # Errors
+    /// `SHADER` where [`GpuScene::share`] was not called.
+    pub fn record(&self, recorder: &mut Recorder<'_>) -> Result<()> {
+        self.pyramid.as_ref().map_or(Ok(()), |pyramid| pyramid.record(recorder))
+    }
+
     /// The punctual lights as they are uploaded now, in the order of the scene.
     pub fn punctual_lights(&self) -> &[Light] {
         &self.punctual
@@ -130,6 +162,8 @@ impl GpuScene {
         recorder.share("atlas", &self.atlas);
         recorder.share("environment_radiance", &self.environment_radiance);
         recorder.share("environment_alias", &self.environment_alias);
+        let pyramid = self.pyramid.as_ref().map_or(&self.no_pyramid, |pyramid| &pyramid.view);
+        recorder.share("environment_pyramid", pyramid);
     }
 }
 
@@ -142,16 +176,30 @@ fn features(scene: &FlatScene) -> SceneFeatures {
         textures: slots.into_iter().any(|slot| slot.width > 0),
         alpha_masks: scene.triangles.iter().any(|t| t.flags & TRIANGLE_ALPHA_MASK != 0),
         environment: environment_light(scene) != NONE,
-        punctual_lights: scene.lights.iter().any(|l| l.kind != LIGHT_TRIANGLE && l.kind != LIGHT_ENVIRONMENT),
+        sun: sun_light(scene) != NONE,
+        environment_pyramid: false,
+        punctual_lights: scene.lights.iter().any(|l| l.kind != LIGHT_TRIANGLE && !is_distant(l)),
     }
 }
 
 /// Index of the environment among the lights, or `NONE`.
 pub fn environment_light(scene: &FlatScene) -> u32 {
-    match scene.lights.last() {
-        Some(light) if light.kind == LIGHT_ENVIRONMENT => scene.lights.len() as u32 - 1,
-        _ => NONE,
-    }
+    distant_light(scene, LIGHT_ENVIRONMENT)
+}
+
+/// Index of the sun among the lights, or `NONE`.
+pub fn sun_light(scene: &FlatScene) -> u32 {
+    distant_light(scene, LIGHT_SUN)
+}
+
+fn is_distant(light: &Light) -> bool {
+    matches!(light.kind, LIGHT_SUN | LIGHT_ENVIRONMENT)
+}
+
+/// Distant lights are the last.
+fn distant_light(scene: &FlatScene, kind: u32) -> u32 {
+    let last = scene.lights.iter().enumerate().rev().take_while(|(_, light)| is_distant(light));
+    last.into_iter().find(|(_, light)| light.kind == kind).map_or(NONE, |(index, _)| index as u32)
 }
 
 fn upload(gpu: &Gpu, label: &str, size: [u32; 3], format: wgpu::TextureFormat, bytes: &[u8]) -> wgpu::Texture {
@@ -167,13 +215,20 @@ fn upload(gpu: &Gpu, label: &str, size: [u32; 3], format: wgpu::TextureFormat, b
         usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
     });
-    let row = width * format.block_copy_size(None).unwrap_or(4);
+    write(gpu, &texture, bytes);
+    texture
+}
+
+/// Replaces all texels.
+fn write(gpu: &Gpu, texture: &wgpu::Texture, bytes: &[u8]) {
+    let wgpu::Extent3d { width, height, .. } = texture.size();
+    let row = width * texture.format().block_copy_size(None).unwrap_or(4);
     // Layer by layer, so that no staging copy is larger than a layer.
     let layer_bytes = row as usize * height as usize;
     for (layer, data) in bytes.chunks_exact(layer_bytes).enumerate() {
         gpu.queue.write_texture(
             wgpu::TexelCopyTextureInfo {
-                texture: &texture,
+                texture,
                 mip_level: 0,
                 origin: wgpu::Origin3d { x: 0, y: 0, z: layer as u32 },
                 aspect: wgpu::TextureAspect::All,
@@ -183,5 +238,4 @@ fn upload(gpu: &Gpu, label: &str, size: [u32; 3], format: wgpu::TextureFormat, b
             wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
         );
     }
-    texture
 }

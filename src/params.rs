@@ -226,6 +226,12 @@ params! {
         roulette_threshold: float(1.0, 0.001..=100.0, ""),
         /// Where in its pixel a primary ray goes: `box` anywhere in the square, which averages to a smooth picture; `center` through the middle, which keeps edges out of error measurements but aliases (biased against the box filter).
         pixel_filter: choice(0, ["box", "center"]),
+        /// How directions of the environment are drawn: from an `alias` table made when the scene is loaded, in constant time, or by descent of a `pyramid` made on the GPU every frame (002, section 5.3), which suits maps that change. The same density, so the same expected picture.
+        environment_sampling: choice(0, ["alias", "pyramid"]),
+        /// Turn of environment and sun about +Y, counter-clockwise as seen from above.
+        environment_rotation: float(0.0, -360.0..=360.0, "degrees"),
+        /// How fast they turn while frames are not accumulated.
+        environment_rotation_rate: float(0.0, -360.0..=360.0, "degrees a second"),
     }
 }
 

@@ -66,7 +66,14 @@ impl Drop for TemporaryFolder {
 #[test]
 fn every_pass_builds_a_pipeline() {
     let gpu = fresh_gpu();
-    let bare = SceneFeatures { textures: false, alpha_masks: false, environment: false, punctual_lights: false };
+    let bare = SceneFeatures {
+        textures: false,
+        alpha_masks: false,
+        environment: false,
+        sun: false,
+        environment_pyramid: false,
+        punctual_lights: false,
+    };
     for shader in table::ALL.iter().filter(|s| s.workgroup_size[0] > 0) {
         for features in [SceneFeatures::ALL, bare] {
             gpu.pipeline(shader, features);

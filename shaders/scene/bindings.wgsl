@@ -31,7 +31,9 @@ struct Frame {
     scene_radius: f32, // metres
     history: u32, // 1 if the previous frame's buffers may be read
     pixel_filter: u32, // PIXEL_FILTER_BOX or PIXEL_FILTER_CENTER
-    padding: u32,
+    sun_light: u32, // index of the sun in `lights`, or NONE
+    environment_turn: vec2f, // cosine and sine of the turn of environment and sun about +Y
+    previous_environment_turn: vec2f, // the same in the previous frame
 }
 
 struct BvhNode {
@@ -106,7 +108,10 @@ struct Light {
 override scene_has_textures: bool = true;
 override scene_has_alpha_masks: bool = true;
 override scene_has_environment: bool = true;
+override scene_has_sun: bool = true;
 override scene_has_punctual_lights: bool = true;
+// How texels of the environment are drawn: by the pyramid of weights, or by the alias table.
+override environment_by_pyramid: bool = true;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> nodes: array<BvhNode>;
@@ -116,3 +121,4 @@ override scene_has_punctual_lights: bool = true;
 @group(0) @binding(5) var atlas: texture_2d_array<f32>;
 @group(0) @binding(6) var environment_radiance: texture_2d<f32>;
 @group(0) @binding(7) var environment_alias: texture_2d<u32>;
+@group(0) @binding(8) var environment_pyramid: texture_2d<f32>;

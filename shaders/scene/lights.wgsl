@@ -1,6 +1,6 @@
 // The light table: choosing a light and a point on it, and what such a sample sends to a surface.
 //
-// A sample lives in its light's own measure: area for an emissive triangle, solid angle for the environment, and a
+// A sample lives in its light's own measure: area for an emissive triangle, solid angle for environment and sun, and a
 // point mass for point, spot and directional lights. `LightContribution.value` is the integrand's light part in that
 // measure, so that value / pdf is an estimate whatever the kind.
 #include "scene/surface.wgsl"
@@ -13,6 +13,7 @@ const LIGHT_POINT = 1u;
 const LIGHT_SPOT = 2u;
 const LIGHT_DIRECTIONAL = 3u;
 const LIGHT_ENVIRONMENT = 4u;
+const LIGHT_SUN = 5u;
 
 struct LightContribution {
     direction: vec3f, // unit, from the surface to the light
@@ -26,10 +27,6 @@ fn light_sample_barycentrics(sample: LightSample) -> vec2f {
     return sample_triangle(unpack_point(sample.point));
 }
 
-fn environment_sample_direction(sample: LightSample) -> vec3f {
-    return environment_direction(unpack_point(sample.point));
-}
-
 // Draws a light by its probability and a point on it.
 fn light_sample(rng: ptr<function, Rng>) -> LightSample {
     let bits = random_bits(rng);
@@ -38,7 +35,7 @@ fn light_sample(rng: ptr<function, Rng>) -> LightSample {
         light = lights[light].alias_light;
     }
     if scene_has_environment && light == frame.environment_light {
-        return LightSample(light, environment_sample(bits.zw, random_4(rng).xyz));
+        return LightSample(light, environment_sample(bits.zw, rng));
     }
     return LightSample(light, pack_cell(bits.zw >> vec2u(16u)));
 }
@@ -59,6 +56,9 @@ fn light_sample_pdf(sample: LightSample) -> f32 {
     if scene_has_environment && kind == LIGHT_ENVIRONMENT {
         return pmf * environment_point_pdf(sample.point);
     }
+    if scene_has_sun && kind == LIGHT_SUN {
+        return pmf * sun_pdf();
+    }
     return pmf;
 }
 
@@ -74,6 +74,10 @@ fn light_hit_pdf(light: u32, triangle: u32, direction: vec3f, distance: f32) -> 
 
 fn environment_hit_pdf(direction: vec3f) -> f32 {
     return lights[frame.environment_light].pmf * environment_pdf(direction);
+}
+
+fn sun_hit_pdf() -> f32 {
+    return lights[frame.sun_light].pmf * sun_pdf();
 }
 
 // KHR_lights_punctual: inverse square, windowed by the range where one is given.
@@ -127,8 +131,13 @@ fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> L
             distance_2 / cosine);
     }
     if scene_has_environment && kind == LIGHT_ENVIRONMENT {
-        let direction = environment_sample_direction(sample);
-        return LightContribution(direction, ENVIRONMENT_DISTANCE, environment_evaluate(direction), 1.0);
+        let uv = unpack_point(sample.point);
+        let direction = turn_to_world(environment_direction(uv), environment_turn(previous));
+        return LightContribution(direction, ENVIRONMENT_DISTANCE, environment_read(uv), 1.0);
+    }
+    if scene_has_sun && kind == LIGHT_SUN {
+        let direction = sun_sample_direction(unpack_point(sample.point), environment_turn(previous));
+        return LightContribution(direction, ENVIRONMENT_DISTANCE, lights[light].intensity, 1.0);
     }
     if !scene_has_punctual_lights {
         return LightContribution(vec3f(0.0, 1.0, 0.0), 0.0, vec3f(0.0), 0.0);

@@ -15,6 +15,7 @@ const CAMERA = 6u;
 const OFFSET_ORIGIN = 7u;
 const SHADING_NORMAL = 8u;
 const SHADOW_RAY = 9u;
+const PYRAMID_SAMPLE = 10u;
 
 fn evaluate(operation: u32, input: TestInput) -> TestOutput {
     let a = float(input.a);
@@ -47,9 +48,14 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
                 bits(vec4f(environment_uv(a.xyz), 0.0, 0.0)));
         }
         case ENVIRONMENT_SAMPLE: {
-            let point = environment_sample(input.b.xy, a.xyz);
+            let point = environment_cell(environment_texel_by_alias(input.b.xy, a.x), a.yz);
             return TestOutput(bits_3(environment_direction(unpack_point(point)), environment_point_pdf(point)),
                 vec4u(point, 0u, 0u, 0u));
+        }
+        case PYRAMID_SAMPLE: {
+            var rng = rng_new(input.a.xy, 0u, input.a.z, 0u);
+            let texel = environment_texel_by_pyramid(&rng);
+            return TestOutput(vec4u(texel, bitcast<u32>(environment_texel_pdf(texel)), 0u), vec4u(0u));
         }
         // Out along the ray of a film point, and back to the film.
         case CAMERA: {

@@ -63,13 +63,24 @@ pub struct SceneFeatures {
     pub alpha_masks: bool,
     /// An environment.
     pub environment: bool,
+    /// A sun.
+    pub sun: bool,
+    /// Sampling of the environment by its pyramid rather than by its alias table.
+    pub environment_pyramid: bool,
     /// Any point, spot or directional light.
     pub punctual_lights: bool,
 }
 
 impl SceneFeatures {
     /// Everything: right for every scene, fast for few.
-    pub const ALL: Self = SceneFeatures { textures: true, alpha_masks: true, environment: true, punctual_lights: true };
+    pub const ALL: Self = SceneFeatures {
+        textures: true,
+        alpha_masks: true,
+        environment: true,
+        sun: true,
+        environment_pyramid: true,
+        punctual_lights: true,
+    };
 
     /// The value of the shader's `override` of this name.
     fn has(self, name: &str) -> bool {
@@ -77,6 +88,8 @@ impl SceneFeatures {
             "scene_has_textures" => self.textures,
             "scene_has_alpha_masks" => self.alpha_masks,
             "scene_has_environment" => self.environment,
+            "scene_has_sun" => self.sun,
+            "environment_by_pyramid" => self.environment_pyramid,
             "scene_has_punctual_lights" => self.punctual_lights,
             _ => true,
         }

@@ -162,6 +162,8 @@ pub const LIGHT_SPOT: u32 = 2;
 pub const LIGHT_DIRECTIONAL: u32 = 3;
 /// [`Light::kind`]: the environment.
 pub const LIGHT_ENVIRONMENT: u32 = 4;
+/// [`Light::kind`]: the sun.
+pub const LIGHT_SUN: u32 = 5;
 
 gpu_struct! {
 /// One light with its entry in the alias table: 96 bytes.
@@ -174,13 +176,13 @@ pub struct Light {
     pub previous_position: Vec3,
     /// Index of the triangle of an emissive triangle.
     pub triangle: u32,
-    /// Unit direction in which a spot or directional light shines.
+    /// Unit direction in which a spot, a directional light or the sun shines.
     pub direction: Vec3,
     /// Range in metres; 0 for unlimited.
     pub range: f32,
-    /// Candela (point, spot) or lux (directional), linear Rec. 709.
+    /// Candela (point, spot), lux (directional) or radiance (sun), linear Rec. 709.
     pub intensity: Vec3,
-    /// cos of the spot's outer angle.
+    /// cos of the spot's outer angle; 1 - cos of the sun's angular radius.
     pub cos_outer: f32,
     /// cos of the spot's inner angle.
     pub cos_inner: f32,

@@ -37,11 +37,17 @@ fn weighted_emission(surface: Surface, direction: vec3f, distance: f32, brdf_pdf
     return surface.emission * mis_weight(frame.mis_heuristic, brdf_pdf, pdf);
 }
 
+// The same for a ray that left the scene. Map and sun are two lights, each weighted by its own density.
 fn weighted_environment(direction: vec3f, brdf_pdf: f32) -> vec3f {
-    if !scene_has_environment {
-        return vec3f(0.0);
+    var radiance = vec3f(0.0);
+    if scene_has_environment {
+        let weight = mis_weight(frame.mis_heuristic, brdf_pdf, environment_hit_pdf(direction));
+        radiance += environment_map_radiance(direction) * weight;
     }
-    return environment_evaluate(direction) * mis_weight(frame.mis_heuristic, brdf_pdf, environment_hit_pdf(direction));
+    if scene_has_sun {
+        radiance += sun_radiance(direction) * mis_weight(frame.mis_heuristic, brdf_pdf, sun_hit_pdf());
+    }
+    return radiance;
 }
 
 // Radiance scattered by `start` towards its viewer, over paths of at most `frame.max_depth` scattering events. Without

@@ -2,15 +2,17 @@
 
 mod atlas;
 mod bytes;
+pub(crate) mod environment;
 mod framing;
 mod lights;
 mod materials;
 mod triangles;
 mod validate;
 
+pub use environment::FlatEnvironment;
 pub(super) use triangles::face_normal;
 
-use super::gpu_types::{BvhNode, EnvironmentTexel, Light, Material, NONE, Triangle};
+use super::gpu_types::{BvhNode, Light, Material, NONE, Triangle};
 use super::{Camera, LightMotion, MAX_COORDINATE, Projection, PunctualKind, Scene, bvh};
 use crate::error::{Error, Result};
 use glam::{Vec3, Vec4};
@@ -26,19 +28,6 @@ pub struct Atlas {
     pub texels: Vec<u8>,
 }
 
-/// The environment with its alias table.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FlatEnvironment {
-    /// Width in texels.
-    pub width: u32,
-    /// Height in texels.
-    pub height: u32,
-    /// Linear radiance, RGB and an unused 1.
-    pub radiance: Vec<[f32; 4]>,
-    /// One entry a texel.
-    pub alias: Vec<EnvironmentTexel>,
-}
-
 /// What a scene holds, for reports.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SceneStats {
@@ -52,7 +41,7 @@ pub struct SceneStats {
     pub materials: u64,
     /// Textures.
     pub textures: u64,
-    /// Lights: emissive triangles + punctual lights + environment.
+    /// Lights: emissive triangles + punctual lights + sun + environment.
     pub lights: u64,
     /// Emissive triangles among them.
     pub emissive_triangles: u64,
@@ -77,7 +66,7 @@ pub struct FlatScene {
     pub triangles: Vec<Triangle>,
     /// At least one.
     pub materials: Vec<Material>,
-    /// With alias table; the environment, if any, is the last. May be empty.
+    /// With alias table; the sun and the environment, if any, are the last. May be empty.
     pub lights: Vec<Light>,
     /// Index in `lights` of the first punctual light; they follow in the order of [`Scene::lights`].
     pub first_punctual: u32,
@@ -126,10 +115,10 @@ impl FlatScene {
 
         progress(0.9, "weighing lights");
         let environment = match &scene.environment {
-            Some(environment) => lights::environment(environment)?,
+            Some(environment) => FlatEnvironment::build(environment)?,
             None => None,
         };
-        let (lights, first_punctual) = lights::build(&mut triangles, &materials, &scene.lights, environment.is_some())?;
+        let (lights, first_punctual) = lights::build(&mut triangles, &materials, &scene.lights, scene.sun.as_ref(), environment.is_some())?;
         for motion in &scene.motions {
             if motion.light as usize >= scene.lights.len() {
                 return Err(Error::bad_value("light motion", format!("there is no light {}", motion.light)));

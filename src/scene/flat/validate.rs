@@ -2,7 +2,7 @@
 
 use super::{Atlas, FlatEnvironment, FlatScene};
 use crate::scene::bvh::MAX_DEPTH;
-use crate::scene::gpu_types::{LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, Material, NONE, TextureSlot, Triangle};
+use crate::scene::gpu_types::{LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, Material, NONE, TextureSlot, Triangle};
 
 /// (where, what is wrong there).
 type Fault = (String, String);
@@ -118,6 +118,11 @@ fn check_light(scene: &FlatScene, index: usize, light: &Light) -> Result<(), &'s
             let triangle = scene.triangles.get(light.triangle as usize);
             let mutual = triangle.is_some_and(|triangle| triangle.light as usize == index);
             must(mutual && index < scene.first_punctual as usize, "not the triangle it says it is")
+        }
+        LIGHT_SUN => {
+            let only_environment_follows =
+                scene.lights.get(index + 1..).is_some_and(|rest| rest.iter().all(|l| l.kind == LIGHT_ENVIRONMENT));
+            must(only_environment_follows && light.cos_outer > 0.0, "a sun out of place")
         }
         LIGHT_ENVIRONMENT => must(is_last && scene.environment.is_some(), "an environment out of place"),
         kind => must(kind < LIGHT_ENVIRONMENT && index >= scene.first_punctual as usize, "an unknown kind"),
