@@ -54,7 +54,9 @@ impl EnvironmentPyramid {
             let texture = level.texture();
             let size = UVec2::new(texture.width() >> i, texture.height() >> i).max(UVec2::ONE);
             match i.checked_sub(1).and_then(|finer| self.levels.get(finer)) {
-                None => recorder.pass(&table::SCENE_ENVIRONMENT_WEIGHTS).bind("level_out", level).dispatch_over(size)?,
+                None => {
+                    recorder.pass(&table::SCENE_ENVIRONMENT_WEIGHTS).bind("level_out", level).dispatch_over(size)?
+                }
                 Some(finer) => recorder
                     .pass(&table::SCENE_ENVIRONMENT_REDUCE)
                     .bind("level_out", level)

@@ -2,7 +2,7 @@
 //!
 //! `gpu_struct!` registers a struct's size and field offsets in its `LAYOUT`; [`crate::gpu_layouts`] lists them all.
 
-use glam::{Mat4, Vec3, Vec4};
+use glam::{Mat4, Vec2, Vec3, Vec4, Vec4Swizzles};
 
 /// Size and field offsets of one Rust struct with a WGSL twin.
 #[derive(Debug, Clone, Copy)]
@@ -49,6 +49,14 @@ pub struct BvhNode {
     /// Number of triangles; 0 for an inner node.
     pub count: u32,
 }
+}
+
+impl Triangle {
+    /// Texture coordinates of the corners in a UV set, 0 or 1.
+    pub(crate) fn uvs(&self, set: usize) -> [Vec2; 3] {
+        let Triangle { uv_a, uv_b, uv_c, .. } = self;
+        if set == 0 { [uv_a.xy(), uv_a.zw(), uv_b.xy()] } else { [uv_b.zw(), uv_c.xy(), uv_c.zw()] }
+    }
 }
 
 /// [`Triangle::flags`]: the back is a surface too.

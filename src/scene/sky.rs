@@ -86,7 +86,7 @@ impl Sky {
         ]
     }
 
-    /// Puts this sky and its sun round a scene, in place of what was there.
+    /// Puts this sky and its sun round a scene, in place of its environment and sun.
     pub fn surround(&self, scene: &mut Scene) {
         let air = Air::new(self);
         let (environment, sun) = air.render(self);
@@ -197,7 +197,7 @@ impl Air {
             let [r, mu] = transmittance_at([x, y]);
             (-air.optical_depth(r, mu)).exp()
         });
-        air.multiple = Table::new([32, 32], |x, y| air.multiple_scattering(GROUND + (TOP - GROUND) * y, 2.0 * x - 1.0));
+        air.multiple = Table::new([32, 16], |x, y| air.multiple_scattering(GROUND + (TOP - GROUND) * y, 2.0 * x - 1.0));
         air
     }
 
@@ -311,11 +311,8 @@ impl Air {
             height: HEIGHT as u32,
             pixels: pixels.iter().map(|p| p.as_vec3().to_array()).collect(),
         };
-        let sun = Sun {
-            direction: sun.as_vec3(),
-            irradiance: irradiance.as_vec3(),
-            angular_radius: SUN_ANGULAR_RADIUS,
-        };
+        let sun =
+            Sun { direction: sun.as_vec3(), irradiance: irradiance.as_vec3(), angular_radius: SUN_ANGULAR_RADIUS };
         (environment, sun)
     }
 }
@@ -328,8 +325,7 @@ fn rayleigh_phase(cosine: f64) -> f64 {
 fn mie_phase(cosine: f64) -> f64 {
     let g = MIE_ANISOTROPY;
     let g2 = g * g;
-    3.0 / (8.0 * PI) * (1.0 - g2) * (1.0 + cosine * cosine)
-        / ((2.0 + g2) * (1.0 + g2 - 2.0 * g * cosine).powf(1.5))
+    3.0 / (8.0 * PI) * (1.0 - g2) * (1.0 + cosine * cosine) / ((2.0 + g2) * (1.0 + g2 - 2.0 * g * cosine).powf(1.5))
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 
 pub mod gltf_writer;
 pub mod harness;
+pub mod plate;
 pub mod statistics;
 pub mod twins;
 

@@ -1,8 +1,9 @@
 //! The light table.
 
+use super::emission::Emission;
 use crate::error::{Error, Result};
 use crate::scene::gpu_types::{
-    LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, LIGHT_SUN, LIGHT_TRIANGLE, Light, Material, NONE, Triangle,
+    LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, LIGHT_SUN, LIGHT_TRIANGLE, Light, NONE, Triangle,
 };
 use crate::scene::{PunctualKind, PunctualLight, Sun, alias};
 use glam::{DVec3, Vec3};
@@ -19,20 +20,19 @@ pub(super) fn luminance(color: Vec3) -> f64 {
 /// The table: emissive triangles (which learn their index in it), punctual lights in order, then the sun, the environment
 /// last. Returns it with the index of the first punctual light.
 ///
-/// A triangle weighs luminance x area (its texture is not considered: it can only make it darker), a punctual light the
+/// A triangle weighs the luminance of its emission times area, a punctual light the
 /// luminance of its intensity, sun and environment together as much as all the others, each the same.
 pub(super) fn build(
     triangles: &mut [Triangle],
-    materials: &[Material],
+    emission: &Emission,
     punctual: &[PunctualLight],
     sun: Option<&Sun>,
     has_environment: bool,
 ) -> Result<(Vec<Light>, u32)> {
-    let emitted: Vec<f64> = materials.iter().map(|material| luminance(material.emissive)).collect();
     let mut lights = Vec::new();
     let mut weights = Vec::new();
     for (i, triangle) in triangles.iter_mut().enumerate() {
-        let emitted = emitted.get(triangle.material as usize).copied().unwrap_or_default();
+        let emitted = emission.mean(triangle.material, |set| triangle.uvs(set));
         if emitted > 0.0 {
             triangle.light = lights.len() as u32;
             lights.push(Light { triangle: i as u32, ..empty(LIGHT_TRIANGLE) });

@@ -2,6 +2,7 @@
 
 mod atlas;
 mod bytes;
+mod emission;
 pub(crate) mod environment;
 mod framing;
 mod lights;
@@ -118,7 +119,13 @@ impl FlatScene {
             Some(environment) => FlatEnvironment::build(environment)?,
             None => None,
         };
-        let (lights, first_punctual) = lights::build(&mut triangles, &materials, &scene.lights, scene.sun.as_ref(), environment.is_some())?;
+        let (lights, first_punctual) = lights::build(
+            &mut triangles,
+            &emission::Emission::new(scene),
+            &scene.lights,
+            scene.sun.as_ref(),
+            environment.is_some(),
+        )?;
         for motion in &scene.motions {
             if motion.light as usize >= scene.lights.len() {
                 return Err(Error::bad_value("light motion", format!("there is no light {}", motion.light)));

@@ -2,7 +2,9 @@
 
 use super::{Atlas, FlatEnvironment, FlatScene};
 use crate::scene::bvh::MAX_DEPTH;
-use crate::scene::gpu_types::{LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, Material, NONE, TextureSlot, Triangle};
+use crate::scene::gpu_types::{
+    LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, Material, NONE, TextureSlot, Triangle,
+};
 
 /// (where, what is wrong there).
 type Fault = (String, String);
