@@ -40,12 +40,20 @@ pub struct Frame {
     pub history: u32,
     /// 0 box, 1 centre.
     pub pixel_filter: u32,
-    /// Index of the sun among the lights, or `NONE`.
-    pub sun_light: u32,
+    /// Root of the top-level BVH in `nodes`.
+    pub top_level: u32,
     /// Cosine and sine of the turn of environment and sun about +Y.
     pub environment_turn: Vec2,
     /// The same in the previous frame.
     pub previous_environment_turn: Vec2,
+    /// Index of the sun among the lights, or `NONE`.
+    pub sun_light: u32,
+    /// Unused.
+    pub padding_0: u32,
+    /// Unused.
+    pub padding_1: u32,
+    /// Unused.
+    pub padding_2: u32,
 }
 }
 

@@ -464,9 +464,13 @@ impl Renderer {
             scene_radius: 0.5 * (high - low).length(),
             history: self.previous_camera.is_some().into(),
             pixel_filter: self.render_params.pixel_filter,
+            top_level: self.gpu_scene.top_level(),
             sun_light: sun_light(&self.scene),
             environment_turn: self.environment_turn(self.moment),
             previous_environment_turn: self.environment_turn(self.previous_moment),
+            padding_0: 0,
+            padding_1: 0,
+            padding_2: 0,
         }
     }
 

@@ -8,14 +8,13 @@ mod support;
 
 use glam::{DVec3, Vec2, Vec3};
 use restir::scene::{
-    AlphaMode, Camera, Environment, Instance, Material, Projection, PunctualKind, PunctualLight, Texture,
-    TextureRef, Wrap, shapes,
+    AlphaMode, Camera, Environment, Instance, Material, Projection, PunctualKind, PunctualLight, Texture, TextureRef,
+    Wrap, shapes,
 };
 use std::f64::consts::PI;
 use std::sync::Arc;
 use support::plate::{check, from_rectangle, materials, plate, scattered};
 use support::twins::Brdf;
-
 
 #[test]
 fn under_a_point_light() {

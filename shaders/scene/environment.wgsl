@@ -38,7 +38,7 @@ fn environment_point_pdf(point: u32) -> f32 {
 }
 
 fn environment_texel_pdf(texel: vec2u) -> f32 {
-    if !environment_by_pyramid {
+    if !scene_has_environment_pyramid {
         return bitcast<f32>(textureLoad(environment_alias, texel, 0).z);
     }
     // The probabilities of the descent, child over parent, multiply to texel over total.
@@ -68,7 +68,7 @@ fn first_cell(texel: vec2u, size: vec2u) -> vec2u {
 // A point of the map.
 fn environment_sample(bits: vec2u, rng: ptr<function, Rng>) -> u32 {
     let u = random_4(rng);
-    if environment_by_pyramid {
+    if scene_has_environment_pyramid {
         return environment_cell(environment_texel_by_pyramid(rng), u.yz);
     }
     return environment_cell(environment_texel_by_alias(bits, u.x), u.yz);

@@ -157,6 +157,7 @@ pub fn frame_of(scene: &FlatScene, camera: &Camera) -> frame::Frame {
         max_depth: 1,
         light_count: scene.lights.len() as u32,
         environment_light: environment_light(scene),
+        top_level: scene.root(),
         sun_light: sun_light(scene),
         environment_turn: glam::Vec2::X,
         previous_environment_turn: glam::Vec2::X,

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 const _: () = assert!(cfg!(target_endian = "little"), "arrays are copied as they lie in memory");
 
 const MAGIC: [u8; 4] = *b"RSTR";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const PREFIX: usize = 16;
 const ALIGNMENT: usize = 16;
 
@@ -38,6 +38,9 @@ struct Header {
 struct Sections {
     nodes: usize,
     triangles: usize,
+    attributes: usize,
+    meshes: usize,
+    instances: usize,
     materials: usize,
     lights: usize,
     atlas_texels: usize,
@@ -80,6 +83,9 @@ impl FlatScene {
         };
         section(bytemuck::cast_slice(&self.nodes));
         section(bytemuck::cast_slice(&self.triangles));
+        section(bytemuck::cast_slice(&self.attributes));
+        section(bytemuck::cast_slice(&self.meshes));
+        section(bytemuck::cast_slice(&self.instances));
         section(bytemuck::cast_slice(&self.materials));
         section(bytemuck::cast_slice(&self.lights));
         section(&self.atlas.texels);
@@ -111,11 +117,24 @@ impl FlatScene {
         }
         let header = reader.take(u32::from_le_bytes(word(2)) as usize, "header")?;
         let header: Header = serde_json::from_slice(header).map_err(|e| bad("header", e.to_string()))?;
-        let Sections { nodes, triangles, materials, lights, atlas_texels, environment_texels } = header.sections;
+        let Sections {
+            nodes,
+            triangles,
+            attributes,
+            meshes,
+            instances,
+            materials,
+            lights,
+            atlas_texels,
+            environment_texels,
+        } = header.sections;
         let scene = FlatScene {
             name: header.name,
             nodes: reader.array(nodes, "nodes")?,
             triangles: reader.array(triangles, "triangles")?,
+            attributes: reader.array(attributes, "attributes")?,
+            meshes: reader.array(meshes, "meshes")?,
+            instances: reader.array(instances, "instances")?,
             materials: reader.array(materials, "materials")?,
             lights: reader.array(lights, "lights")?,
             first_punctual: header.first_punctual,
@@ -213,6 +232,9 @@ fn header_of(scene: &FlatScene) -> Header {
         sections: Sections {
             nodes: scene.nodes.len(),
             triangles: scene.triangles.len(),
+            attributes: scene.attributes.len(),
+            meshes: scene.meshes.len(),
+            instances: scene.instances.len(),
             materials: scene.materials.len(),
             lights: scene.lights.len(),
             atlas_texels: scene.atlas.texels.len(),
