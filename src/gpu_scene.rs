@@ -6,7 +6,7 @@ use crate::gpu::Gpu;
 use crate::gpu::data_texture::DataTexture;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
-use crate::scene::FlatScene;
+use crate::scene::{FlatScene, Shape};
 use crate::scene::flat::{FlatEnvironment, FlatInstance, levels};
 use crate::scene::gpu_types::{
     BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK,
@@ -231,6 +231,7 @@ fn features(scene: &FlatScene) -> SceneFeatures {
         environment: environment_light(scene) != NONE,
         sun: sun_light(scene) != NONE,
         environment_pyramid: false,
+        shapes: scene.triangles.iter().any(|t| t.shape() != Shape::Triangles),
         punctual_lights: scene.lights.iter().any(|l| l.kind != LIGHT_TRIANGLE && !is_distant(l)),
         instances: scene.has_top_level(),
         many_triangles: scene.triangles.len() > FIRST_TRIANGLES,

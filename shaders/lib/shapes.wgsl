@@ -18,10 +18,10 @@ fn shape_contains(shape: u32, uv: vec2f) -> bool {
     }
 }
 
-// A point of a flat shape, uniform over its area.
+// A point of a flat shape, uniform over its area; of a sphere, the point of its octahedral map.
 fn shape_sample(shape: u32, u: vec2f) -> vec2f {
     switch shape {
-        case SHAPE_RECTANGLE: { return u; }
+        case SHAPE_RECTANGLE, SHAPE_SPHERE: { return u; }
         case SHAPE_DISK: { return sample_disk(u); }
         default: { return sample_triangle(u); }
     }

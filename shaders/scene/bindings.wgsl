@@ -126,6 +126,8 @@ override scene_has_textures: bool = true;
 override scene_has_alpha_masks: bool = true;
 override scene_has_environment: bool = true;
 override scene_has_sun: bool = true;
+// Primitives other than triangles.
+override scene_has_shapes: bool = true;
 override scene_has_punctual_lights: bool = true;
 // How texels of the environment are drawn: by the pyramid of weights, or by the alias table.
 override scene_has_environment_pyramid: bool = true;

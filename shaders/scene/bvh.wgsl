@@ -3,6 +3,7 @@
 // may be inlined.
 #include "scene/data.wgsl"
 #include "scene/texture.wgsl"
+#include "lib/shapes.wgsl"
 
 // The builders guarantee that no path down both levels is longer (src/scene/bvh.rs).
 const BVH_STACK = 84u;
@@ -10,6 +11,7 @@ const BVH_STACK = 84u;
 const TRIANGLE_DOUBLE_SIDED = 1u;
 const TRIANGLE_ALPHA_MASK = 2u;
 const TRIANGLE_TANGENTS = 4u;
+const SHAPE_SHIFT = 28u;
 const BITANGENT_SHIFT = 16u;
 
 struct Hit {
@@ -46,11 +48,27 @@ fn passes_alpha(triangle: u32, uv: vec2f) -> bool {
     return alpha >= material.alpha_cutoff;
 }
 
+fn shape_of(flags: u32) -> u32 {
+    return (flags >> SHAPE_SHIFT) & 3u;
+}
+
+fn is_sphere(flags: u32) -> bool {
+    return scene_has_shapes && shape_of(flags) == SHAPE_SPHERE;
+}
+
 // Möller and Trumbore 1997. A triangle seen from its back is missed unless it is double-sided (glTF 2.0, 3.9.6).
 fn intersect_triangle(index: u32, instance: u32, origin: vec3f, direction: vec3f, hit: ptr<function, Hit>) {
     let triangle = load_triangle(index);
     let e1 = triangle.p1 - triangle.p0;
     let e2 = triangle.p2 - triangle.p0;
+    if is_sphere(triangle.flags) {
+        let relative = origin - triangle.p0;
+        let t = enter_sphere(relative, direction, length(e1));
+        if t > 0.0 && t < (*hit).t {
+            *hit = Hit(t, index, sphere_uv(normalize(relative + t * direction)), instance);
+        }
+        return;
+    }
     let p = cross(direction, e2);
     let determinant = dot(e1, p);
     if determinant <= 0.0 && (determinant == 0.0 || (triangle.flags & TRIANGLE_DOUBLE_SIDED) == 0u) {
@@ -62,7 +80,14 @@ fn intersect_triangle(index: u32, instance: u32, origin: vec3f, direction: vec3f
     let q = cross(s, e1);
     let v = dot(direction, q) * inverse;
     let t = dot(e2, q) * inverse;
-    if u < 0.0 || v < 0.0 || u + v > 1.0 || t <= 0.0 || t >= (*hit).t {
+    if t <= 0.0 || t >= (*hit).t {
+        return;
+    }
+    if scene_has_shapes {
+        if !shape_contains(shape_of(triangle.flags), vec2f(u, v)) {
+            return;
+        }
+    } else if u < 0.0 || v < 0.0 || u + v > 1.0 {
         return;
     }
     if scene_has_alpha_masks && (triangle.flags & TRIANGLE_ALPHA_MASK) != 0u && !passes_alpha(index, vec2f(u, v)) {

@@ -60,11 +60,25 @@ fn triangle_normal(instance: u32, triangle: u32) -> vec3f {
 
 fn triangle_point(instance: u32, triangle: u32, uv: vec2f) -> vec3f {
     let t = load_triangle(triangle);
-    let point = t.p0 + uv.x * (t.p1 - t.p0) + uv.y * (t.p2 - t.p0);
+    var point = t.p0 + uv.x * (t.p1 - t.p0) + uv.y * (t.p2 - t.p0);
+    if is_sphere(t.flags) {
+        point = t.p0 + length(t.p1 - t.p0) * sphere_normal(uv);
+    }
     if !scene_has_instances {
         return point;
     }
     return instance_point(instance, TO_WORLD, point);
+}
+
+// Unit, out of the front of any primitive at a point of it.
+fn front_normal(instance: u32, triangle: u32, uv: vec2f) -> vec3f {
+    if !is_sphere(load_triangle(triangle).flags) {
+        return normalize(triangle_normal(instance, triangle));
+    }
+    if !scene_has_instances {
+        return sphere_normal(uv);
+    }
+    return normalize(instance_normal(instance, sphere_normal(uv)));
 }
 
 // Radiance that a point of an emissive triangle sends out of its front; black where its alpha mask cuts it away.
@@ -82,6 +96,9 @@ fn emitted_radiance(triangle: u32, uv: vec2f) -> vec3f {
 
 // The interpolated normal of a triangle in its mesh's space, bent by its normal map, on the front side; unit.
 fn shading_normal(triangle: u32, uv: vec2f, uvs: vec4f) -> vec3f {
+    if is_sphere(load_triangle(triangle).flags) {
+        return sphere_normal(uv);
+    }
     let w = vec3f(1.0 - uv.x - uv.y, uv.x, uv.y);
     let a = load_attributes(triangle);
     let n0 = decode_normal(a.normals.x);
@@ -128,7 +145,7 @@ fn load_surface(instance: u32, triangle: u32, uv: vec2f, wo: vec3f) -> Surface {
         surface.light += instance_first_light(instance);
     }
 
-    let front = normalize(triangle_normal(instance, triangle));
+    let front = front_normal(instance, triangle, uv);
     let is_front = dot(front, wo) >= 0.0;
     let side = select(-1.0, 1.0, is_front);
     surface.geometric_normal = front * side;

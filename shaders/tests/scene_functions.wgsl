@@ -26,8 +26,8 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
         }
         case LIGHT_SAMPLE: {
             var rng = rng_new(input.a.xy, 0u, input.a.z, 0u);
-            let sample = light_sample(&rng);
-            return TestOutput(vec4u(sample.light, sample.point, bitcast<u32>(light_sample_pdf(sample)),
+            let sample = light_sample(b.xyz, &rng);
+            return TestOutput(vec4u(sample.light, sample.point, bitcast<u32>(light_sample_pdf(b.xyz, sample)),
                 bitcast<u32>(lights[sample.light].pmf)), vec4u(0u));
         }
         case LIGHT_CONTRIBUTION: {
@@ -41,8 +41,8 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
             let triangle = lights[sample.light].triangle;
             let instance = lights[sample.light].instance;
             let distance = length(triangle_point(instance, triangle, light_sample_barycentrics(sample)) - a.xyz);
-            return TestOutput(bits(vec4f(light_sample_pdf(sample) * light.solid_angle_jacobian,
-                light_hit_pdf(sample.light, instance, triangle, light.direction, distance), 0.0, 0.0)), vec4u(0u));
+            return TestOutput(bits(vec4f(light_sample_pdf(a.xyz, sample) * light.solid_angle_jacobian,
+                light_hit_pdf(sample.light, instance, triangle, a.xyz, light.direction, distance), 0.0, 0.0)), vec4u(0u));
         }
         case ENVIRONMENT: {
             return TestOutput(bits_3(environment_evaluate(a.xyz), environment_pdf(a.xyz)),

@@ -90,6 +90,8 @@ scene_features! {
     environment,
     /// A sun.
     sun,
+    /// Primitives other than triangles.
+    shapes,
     /// A pyramid by which the environment is sampled, rather than by its alias table.
     environment_pyramid,
     /// Any point, spot or directional light.

@@ -81,7 +81,7 @@ impl Scene {
             material: self.materials.len() as u32 - 1,
             ..Mesh::default()
         });
-        self.instances.push(Instance { mesh: self.meshes.len() as u32 - 1, transform, ..Instance::default() });
+        self.instances.push(Instance { mesh: self.meshes.len() as u32 - 1, transform });
         Ok(())
     }
 }

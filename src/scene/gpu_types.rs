@@ -2,6 +2,7 @@
 //!
 //! `gpu_struct!` registers a struct's size and field offsets in its `LAYOUT`; [`crate::gpu_layouts`] lists them all.
 
+use super::Shape;
 use glam::{Mat4, Vec2, Vec3, Vec4, Vec4Swizzles};
 
 /// Size and field offsets of one Rust struct with a WGSL twin.
@@ -51,6 +52,36 @@ pub struct BvhNode {
 }
 }
 
+/// [`Triangle::flags`]: two bits from here on are the [`Shape`].
+pub const SHAPE_SHIFT: u32 = 28;
+
+impl Triangle {
+    /// What the three points are.
+    pub fn shape(&self) -> Shape {
+        [Shape::Triangles, Shape::Rectangle, Shape::Disk, Shape::Sphere][(self.flags >> SHAPE_SHIFT & 3) as usize]
+    }
+
+    /// Low and high corner of the box round it.
+    pub(crate) fn bounds(&self) -> [Vec3; 2] {
+        let Triangle { p0, p1, p2, .. } = *self;
+        let (e1, e2) = (p1 - p0, p2 - p0);
+        // What arithmetic rounds must not stick out.
+        let extended = |half: Vec3| {
+            let half = half + 1e-6 * (half + p0.abs());
+            [p0 - half, p0 + half]
+        };
+        match self.shape() {
+            Shape::Triangles => [p0.min(p1).min(p2), p0.max(p1).max(p2)],
+            Shape::Rectangle => {
+                let p3 = p1 + e2;
+                [p0.min(p1).min(p2).min(p3), p0.max(p1).max(p2).max(p3)]
+            }
+            Shape::Disk => extended((e1 * e1 + e2 * e2).map(f32::sqrt)),
+            Shape::Sphere => extended(Vec3::splat(e1.length())),
+        }
+    }
+}
+
 impl TriangleAttributes {
     /// Texture coordinates of the corners in a UV set, 0 or 1.
     pub(crate) fn uvs(&self, set: usize) -> [Vec2; 3] {
@@ -72,7 +103,7 @@ gpu_struct! {
 pub struct Triangle {
     /// First corner.
     pub p0: Vec3,
-    /// `TRIANGLE_*` bits.
+    /// `TRIANGLE_*` bits, and the shape from bit [`SHAPE_SHIFT`] on.
     pub flags: u32,
     /// Second corner.
     pub p1: Vec3,

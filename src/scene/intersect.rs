@@ -1,6 +1,6 @@
 //! Ray queries on the CPU: the same arithmetic as `shaders/scene/bvh.wgsl`, which tests compare with it.
 
-use super::FlatScene;
+use super::{FlatScene, Shape, octahedral};
 use super::gpu_types::{BvhNode, TRIANGLE_DOUBLE_SIDED, Triangle};
 use glam::Vec3;
 
@@ -71,6 +71,13 @@ fn walk(
 /// Möller and Trumbore 1997: (t, u, v) if 0 < t < `t_max`.
 pub fn intersect_triangle(triangle: &Triangle, origin: Vec3, direction: Vec3, t_max: f32) -> Option<(f32, f32, f32)> {
     let (e1, e2) = (triangle.p1 - triangle.p0, triangle.p2 - triangle.p0);
+    if triangle.shape() == Shape::Sphere {
+        let (origin, radius) = (origin - triangle.p0, e1.length());
+        let t = enter_sphere(origin, direction, radius).filter(|t| *t > 0.0 && *t < t_max)?;
+        let normal = (origin + t * direction).normalize();
+        let p = 0.5 * octahedral::encode(normal) + 0.5;
+        return Some((t, p.x, p.y));
+    }
     let p = direction.cross(e2);
     let determinant = e1.dot(p);
     let culled = determinant < 0.0 && triangle.flags & TRIANGLE_DOUBLE_SIDED == 0;
@@ -83,7 +90,21 @@ pub fn intersect_triangle(triangle: &Triangle, origin: Vec3, direction: Vec3, t_
     let q = s.cross(e1);
     let v = direction.dot(q) * inverse;
     let t = e2.dot(q) * inverse;
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && t < t_max).then_some((t, u, v))
+    let is_within = match triangle.shape() {
+        Shape::Rectangle => u >= 0.0 && v >= 0.0 && u <= 1.0 && v <= 1.0,
+        Shape::Disk => u * u + v * v <= 1.0,
+        _ => u >= 0.0 && v >= 0.0 && u + v <= 1.0,
+    };
+    (is_within && t > 0.0 && t < t_max).then_some((t, u, v))
+}
+
+/// Where a ray enters a sphere from outside; see `shaders/lib/shapes.wgsl`.
+fn enter_sphere(origin: Vec3, direction: Vec3, radius: f32) -> Option<f32> {
+    let (a, b) = (direction.length_squared(), -origin.dot(direction));
+    let nearest = origin + direction * (b / a);
+    let discriminant = radius * radius - nearest.length_squared();
+    let c = origin.length_squared() - radius * radius;
+    (b > 0.0 && c > 0.0 && discriminant >= 0.0).then(|| c / (b + (a * discriminant).sqrt()))
 }
 
 /// Whether the ray meets the node's box within [0, t_max], two ulps wider so that rounding loses none (Ize 2013).

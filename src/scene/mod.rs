@@ -4,6 +4,7 @@
 //! thing as plain arrays with a BVH, ready for upload.
 
 pub mod alias;
+pub mod area_light;
 pub mod builtin;
 pub mod bvh;
 pub mod environment;
@@ -57,9 +58,25 @@ pub struct Scene {
     pub warnings: Vec<String>,
 }
 
+/// What three indices of a [`Mesh`] stand for. With the edges e1 and e2 from the first point to the others:
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Shape {
+    /// A triangle.
+    #[default]
+    Triangles,
+    /// The parallelogram of the edges.
+    Rectangle,
+    /// The ellipse round the first point with the edges for half axes.
+    Disk,
+    /// The sphere round the first point through the second. It is seen from outside only.
+    Sphere,
+}
+
 /// One indexed triangle list with one material.
 #[derive(Debug, Clone, Default)]
 pub struct Mesh {
+    /// What the indices stand for. Only triangles take textures and alpha masks as one expects.
+    pub shape: Shape,
     /// Object-space positions.
     pub positions: Vec<Vec3>,
     /// Object-space unit normals, one a position.

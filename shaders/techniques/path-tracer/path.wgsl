@@ -13,10 +13,10 @@ fn continuation_probability(throughput: vec3f) -> f32 {
 
 // Next-event estimation: the light that one light sample brings to the surface, weighted against BRDF sampling.
 fn estimate_direct_light(surface: Surface, rng: ptr<function, Rng>) -> vec3f {
-    let sample = light_sample(rng);
+    let sample = light_sample(surface.position, rng);
     let light = light_contribution(sample, surface.position, false);
     let scattered = surface_evaluate(surface, light.direction) * light.value;
-    let pdf = light_sample_pdf(sample);
+    let pdf = light_sample_pdf(surface.position, sample);
     if luminance(scattered) <= 0.0 || pdf <= 0.0 || !is_visible(surface, light.direction, light.distance) {
         return vec3f(0.0);
     }
@@ -33,7 +33,8 @@ fn weighted_emission(surface: Surface, direction: vec3f, distance: f32, brdf_pdf
     if surface.light == NONE {
         return vec3f(0.0);
     }
-    let pdf = light_hit_pdf(surface.light, surface.instance, surface.triangle, direction, distance);
+    let from = surface.position - distance * direction;
+    let pdf = light_hit_pdf(surface.light, surface.instance, surface.triangle, from, direction, distance);
     return surface.emission * mis_weight(frame.mis_heuristic, brdf_pdf, pdf);
 }
 

@@ -1,5 +1,6 @@
 //! Procedural, seeded scenes.
 
+mod area_lights;
 mod cornell;
 mod furnace;
 mod glossy_spheres;
@@ -68,6 +69,12 @@ pub const ALL: &[BuiltinInfo] = &[
         doc: "Spheres from smooth to rough and from plastic to metal, under three panels and a dim sky.",
         example: "glossy-spheres",
     },
+    BuiltinInfo {
+        name: "area-lights",
+        title: "Area lights",
+        doc: "A few things on a floor under a sphere, a rectangle and a disk of light.",
+        example: "area-lights",
+    },
 ];
 
 /// Makes a built-in scene; the same name gives the same scene.
@@ -86,6 +93,7 @@ pub fn make(name: &str) -> Result<Scene> {
         "many-lights" => {
             Err(Error::bad_value("many-lights:N", "the number of lights is missing, as in many-lights:10000"))
         }
+        "area-lights" => Ok(area_lights::area_lights()),
         "glossy-spheres" => Ok(glossy_spheres::glossy_spheres()),
         _ => Err(Error::Unknown {
             kind: "built-in scene",

@@ -41,6 +41,11 @@ impl Emission {
         Emission { materials: scene.materials.iter().map(of).collect() }
     }
 
+    /// Luminance of the emissive factor alone.
+    pub(super) fn untextured(&self, material: u32) -> f64 {
+        self.materials.get(material as usize).map_or(0.0, |(luminance, _)| *luminance)
+    }
+
     /// The mean luminance of the emission over a triangle, given its texture coordinates by UV set. 0 only if no point of it
     /// shines, so that every point that does can be sampled.
     pub(super) fn mean(&self, material: u32, uvs: impl FnOnce(usize) -> [Vec2; 3]) -> f64 {

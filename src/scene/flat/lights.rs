@@ -7,9 +7,10 @@ use crate::scene::gpu_types::{
     LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, LIGHT_SUN, LIGHT_TRIANGLE, Light, NONE, Triangle,
     TriangleAttributes,
 };
-use crate::scene::{PunctualKind, PunctualLight, Sun, alias};
+use crate::scene::{PunctualKind, PunctualLight, Shape, Sun, alias};
 use glam::{DVec3, Vec3};
 use std::f32::consts::FRAC_PI_2;
+use std::f64::consts::PI;
 
 /// Smallest angular radius of a sun, in radians: below it no f32 direction would hit it.
 const MIN_SUN_RADIUS: f32 = 1e-5;
@@ -39,7 +40,10 @@ pub(super) fn emitters(
         let range = mesh.first_triangle as usize..(mesh.first_triangle + mesh.triangles) as usize;
         let mut of_mesh = Vec::new();
         for (triangle, attributes) in triangles[range.clone()].iter_mut().zip(&attributes[range]) {
-            let mean = emission.mean(triangle.material, |set| attributes.uvs(set));
+            let mean = match triangle.shape() {
+                Shape::Triangles => emission.mean(triangle.material, |set| attributes.uvs(set)),
+                _ => emission.untextured(triangle.material),
+            };
             if mean > 0.0 {
                 triangle.light = of_mesh.len() as u32;
                 of_mesh.push(mean);
@@ -57,12 +61,22 @@ pub(super) fn emitters(
                 continue;
             }
             let [p0, p1, p2] = [triangle.p0, triangle.p1, triangle.p2].map(|p| instance.transform.transform_point3(p));
-            let area = 0.5 * (p1 - p0).as_dvec3().cross((p2 - p0).as_dvec3()).length();
+            let area = area_factor(triangle.shape()) * (p1 - p0).as_dvec3().cross((p2 - p0).as_dvec3()).length();
             let light = Light { triangle: i, instance: index as u32, ..empty(LIGHT_TRIANGLE) };
             emitters.push((light, emitted[instance.mesh as usize][triangle.light as usize] * area));
         }
     }
     emitters
+}
+
+/// The area of a shape over that of the parallelogram of its edges.
+fn area_factor(shape: Shape) -> f64 {
+    match shape {
+        Shape::Triangles => 0.5,
+        Shape::Rectangle => 1.0,
+        Shape::Disk => PI,
+        Shape::Sphere => 4.0 * PI,
+    }
 }
 
 /// The table: emissive triangles, punctual lights in order, the sun, the environment last. Returns it with the index of
