@@ -33,8 +33,8 @@ fn weighted_emission(surface: Surface, direction: vec3f, distance: f32, brdf_pdf
     if surface.light == NONE {
         return vec3f(0.0);
     }
-    let from = surface.position - distance * direction;
-    let pdf = light_hit_pdf(surface.light, surface.instance, surface.triangle, from, direction, distance);
+    let start = surface.position - distance * direction;
+    let pdf = light_hit_pdf(surface.light, surface.instance, surface.triangle, start, direction, distance);
     return surface.emission * mis_weight(frame.mis_heuristic, brdf_pdf, pdf);
 }
 
