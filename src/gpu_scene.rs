@@ -6,11 +6,11 @@ use crate::gpu::Gpu;
 use crate::gpu::data_texture::DataTexture;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
-use crate::scene::{FlatScene, Shape};
 use crate::scene::flat::{FlatEnvironment, FlatInstance, levels};
 use crate::scene::gpu_types::{
     BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK,
 };
+use crate::scene::{FlatScene, Shape};
 use glam::{Mat4, Quat, UVec2, Vec3, Vec4};
 
 /// Triangles in the first of the two buffers: 128 MiB, what every WebGPU device can bind. As in `shaders/scene/data.wgsl`.

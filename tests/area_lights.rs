@@ -152,11 +152,9 @@ fn samples_lie_where_rays_hit() {
         Vec3::new(0.4, 1.5, -0.3),
     );
     let position = Vec3::new(0.2, 0.1, 0.4);
-    for outline in [
-        Outline::Sphere { radius: 0.5 },
-        Outline::Rectangle { width: 1.0, height: 0.6 },
-        Outline::Disk { radius: 0.5 },
-    ] {
+    for outline in
+        [Outline::Sphere { radius: 0.5 }, Outline::Rectangle { width: 1.0, height: 0.6 }, Outline::Disk { radius: 0.5 }]
+    {
         let mut scene = Scene::default();
         let two_sided = AreaLight { double_sided: true, ..light(outline) };
         scene.add_area_light(&two_sided, turn).expect("a light");
@@ -264,7 +262,8 @@ fn rays_find_every_shape() {
 #[test]
 fn files_place_area_lights() {
     let file = |light: serde_json::Value, scale: [f32; 3]| {
-        let node = json!({"translation": [1, 2, 3], "scale": scale, "extras": {"restir_area_light": light, "other": 1}});
+        let node =
+            json!({"translation": [1, 2, 3], "scale": scale, "extras": {"restir_area_light": light, "other": 1}});
         Writer::new(json!({"scenes": [{"nodes": [0]}], "scene": 0, "nodes": [node]})).glb()
     };
     let load = |light, scale| gltf::load_bytes("light.glb", &file(light, scale), &mut |_| unreachable!());

@@ -107,7 +107,12 @@ mod tests {
         assert!(keeps_spheres(turned) && keeps_spheres(Mat4::from_scale(Vec3::new(2.0, -2.0, 2.0))));
         assert!(!keeps_spheres(Mat4::from_scale(Vec3::new(1.0, 1.0, 1.1))));
         assert!(!keeps_spheres(Mat4::ZERO));
-        let sheared = Mat4::from_cols_array_2d(&[[1.0, 0.0, 0.0, 0.0], [0.5, 0.75f32.sqrt(), 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]);
+        let sheared = Mat4::from_cols_array_2d(&[
+            [1.0, 0.0, 0.0, 0.0],
+            [0.5, 0.75f32.sqrt(), 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ]);
         assert!(!keeps_spheres(sheared));
     }
 

@@ -1,7 +1,7 @@
 //! Ray queries on the CPU: the same arithmetic as `shaders/scene/bvh.wgsl`, which tests compare with it.
 
-use super::{FlatScene, Shape, octahedral};
 use super::gpu_types::{BvhNode, TRIANGLE_DOUBLE_SIDED, Triangle};
+use super::{FlatScene, Shape, octahedral};
 use glam::Vec3;
 
 /// Where a ray met a triangle.

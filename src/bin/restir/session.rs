@@ -80,7 +80,8 @@ impl Session {
         report::warnings(&flat.warnings);
         let camera = scene::camera(&flat.cameras, options.camera.as_deref())?.clone();
         let (scene, stats, warnings) = (flat.name.clone(), flat.stats.clone(), flat.warnings.clone());
-        let turns = options.set.iter().any(|(key, value)| key == TURN && value.parse::<f32>().is_ok_and(|rate| rate != 0.0));
+        let turns =
+            options.set.iter().any(|(key, value)| key == TURN && value.parse::<f32>().is_ok_and(|rate| rate != 0.0));
         let moving = turns || !flat.motions.is_empty();
 
         let gpu = block_on(Gpu::headless(&GpuOptions { default_limits: false }))?;

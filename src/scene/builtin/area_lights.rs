@@ -15,12 +15,7 @@ pub(super) fn area_lights() -> Scene {
             matte("clay", Vec3::new(0.7, 0.45, 0.35)),
             Material { metallic: 1.0, roughness: 0.25, ..matte("metal", Vec3::new(0.9, 0.88, 0.85)) },
         ],
-        cameras: vec![Camera::look_at(
-            "front",
-            Vec3::new(0.0, 2.6, 6.4),
-            Vec3::new(0.0, 0.9, 0.0),
-            40f32.to_radians(),
-        )],
+        cameras: vec![Camera::look_at("front", Vec3::new(0.0, 2.6, 6.4), Vec3::new(0.0, 0.9, 0.0), 40f32.to_radians())],
         ..Scene::default()
     };
     let floor = shapes::parallelogram(Vec3::new(-6.0, 0.0, 6.0), Vec3::X * 12.0, Vec3::Z * -8.0, ground);

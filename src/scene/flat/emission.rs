@@ -6,6 +6,8 @@ use glam::{DVec2, Vec2, Vec3};
 
 /// A triangle is cut by no more texels than this along each side of the box round it: larger ones read a coarser level.
 const MAX_CELLS: f64 = 48.0;
+/// Longest side of the finest level; larger textures begin with means of 2 x 2, 4 x 4, ... texels.
+const MAX_SIDE: u32 = 2048;
 /// Texels are taken for this much larger on every side, for the GPU rounds coordinates.
 const MARGIN: f64 = 0.01;
 
@@ -13,8 +15,12 @@ const MARGIN: f64 = 0.01;
 struct Map {
     reference: TextureRef,
     wrap: [Wrap; 2],
-    /// Finest first; the finest has the texture's size.
+    /// Finest first.
     levels: Vec<Level>,
+    /// Texels of the finest level in a unit of the coordinates.
+    scale: DVec2,
+    /// Whether tiles begin where texels of every level do: sides are powers of two.
+    is_aligned: bool,
 }
 
 struct Level {
@@ -34,7 +40,14 @@ impl Emission {
         let of = |material: &Material| {
             let map = material.emissive_texture.filter(|_| material.emissive != Vec3::ZERO).and_then(|reference| {
                 let texture = scene.textures.get(reference.texture as usize)?;
-                Some(Map { reference, wrap: texture.wrap, levels: levels(texture, material.emissive) })
+                let block = texture.width.max(texture.height).div_ceil(MAX_SIDE).next_power_of_two();
+                Some(Map {
+                    reference,
+                    wrap: texture.wrap,
+                    levels: levels(texture, material.emissive, block as usize),
+                    scale: DVec2::new(texture.width.into(), texture.height.into()) / f64::from(block),
+                    is_aligned: texture.width.is_power_of_two() && texture.height.is_power_of_two(),
+                })
             });
             (luminance(material.emissive), map)
         };
@@ -62,15 +75,23 @@ fn srgb_decode(value: f32) -> f32 {
     if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }
 
-/// The mean of bilinear or nearest reading over every texel, and over 2 x 2, 4 x 4, ... of them.
-fn levels(texture: &Texture, factor: Vec3) -> Vec<Level> {
+/// The mean of bilinear or nearest reading over every `block` x `block` texels, and over 2 x 2, 4 x 4, ... of those.
+fn levels(texture: &Texture, factor: Vec3, block: usize) -> Vec<Level> {
     let (width, height) = (texture.width as usize, texture.height as usize);
     let linear: Vec<f32> = (0..=255u8).map(|byte| srgb_decode(f32::from(byte) / 255.0)).collect();
-    let texels = texture.pixels.as_chunks::<4>().0.iter().map(|[r, g, b, _]| {
+    let texel = |x: usize, y: usize| {
+        let Some([r, g, b, _]) = texture.pixels.as_chunks::<4>().0.get(y * width + x) else { return 0.0 };
         let color = Vec3::new(linear[usize::from(*r)], linear[usize::from(*g)], linear[usize::from(*b)]);
         luminance(factor * color) as f32
+    };
+    let (columns, rows) = (width.div_ceil(block), height.div_ceil(block));
+    let means = (0..columns * rows).map(|i| {
+        let (x, y) = (i % columns * block, i / columns * block);
+        let (ends, below) = ((x + block).min(width), (y + block).min(height));
+        let sum: f32 = (y..below).flat_map(|y| (x..ends).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).sum();
+        sum / ((ends - x) * (below - y)) as f32
     });
-    let mut finest = Level { width, height, values: texels.collect() };
+    let mut finest = Level { width: columns, height: rows, values: means.collect() };
     if texture.linear_filter {
         finest = finest.filtered(texture.wrap);
     }
@@ -142,19 +163,19 @@ impl Map {
             DVec2::new(row_u.dot(uv), row_v.dot(uv))
         });
         let (low, high) = corners.iter().fold((corners[0], corners[0]), |(a, b), p| (a.min(*p), b.max(*p)));
-        let finest = &self.levels[0];
-        let size = |level: &Level| DVec2::new(level.width as f64, level.height as f64);
         // A triangle over more than the whole texture shines with its mean, or nearly.
         let coarsest = self.levels.len() - 1;
         if !(low.is_finite() && high.is_finite()) || (high - low).max_element() > 4.0 {
             return self.levels[coarsest].at(0, 0).into();
         }
-        let extent = ((high - low) * size(finest)).max_element();
+        let extent = ((high - low) * self.scale).max_element();
         let level = (extent / MAX_CELLS).log2().ceil().clamp(0.0, coarsest as f64) as usize;
-        let mean = self.levels[level].mean(corners.map(|p| p * size(finest) / f64::from(1u32 << level)), self.wrap);
-        // Tiles whose sides are no powers of two do not begin where texels of coarser levels do.
-        let is_aligned = level == 0 || (finest.width.is_power_of_two() && finest.height.is_power_of_two());
-        if is_aligned { mean } else { mean.max(1e-3 * f64::from(self.levels[coarsest].at(0, 0))) }
+        let mean = self.levels[level].mean(corners.map(|p| p * self.scale / f64::from(1u32 << level)), self.wrap);
+        if self.is_aligned || (level == 0 && self.scale.fract() == DVec2::ZERO) {
+            mean
+        } else {
+            mean.max(1e-3 * f64::from(self.levels[coarsest].at(0, 0)))
+        }
     }
 }
 

@@ -2,7 +2,8 @@
 
 use crate::error::{Error, Result};
 use crate::scene::gpu_types::{
-    BITANGENT_SHIFT, NONE, SHAPE_SHIFT, TRIANGLE_ALPHA_MASK, TRIANGLE_DOUBLE_SIDED, TRIANGLE_TANGENTS, Triangle, TriangleAttributes,
+    BITANGENT_SHIFT, NONE, SHAPE_SHIFT, TRIANGLE_ALPHA_MASK, TRIANGLE_DOUBLE_SIDED, TRIANGLE_TANGENTS, Triangle,
+    TriangleAttributes,
 };
 use crate::scene::{AlphaMode, MAX_COORDINATE, Mesh, Scene, octahedral};
 use glam::{Mat3, Mat4, Vec2, Vec3, Vec4};
