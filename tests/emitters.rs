@@ -63,11 +63,13 @@ fn expected() -> DVec3 {
 #[test]
 fn only_what_shines_is_a_light() {
     let scene = flatten(&under_a_strip(COLUMNS));
-    assert_eq!(scene.lights.len(), 4, "two triangles each of two columns");
-    let pmf: Vec<f32> = scene.lights.iter().map(|light| light.pmf).collect();
-    let (brightest, dimmest) = (pmf.iter().fold(0f32, |a, &b| a.max(b)), pmf.iter().fold(1f32, |a, &b| a.min(b)));
-    // Texels are taken for a hundredth larger than they are, which blends a little of the dark neighbours in.
-    assert!((brightest / dimmest / 10.0 - 1.0).abs() < 0.1, "{pmf:?}");
+    let mut pmf: Vec<f32> = scene.lights.iter().map(|light| light.pmf).collect();
+    pmf.sort_by(|a, b| b.total_cmp(a));
+    // Two triangles each of two columns; and a little for their neighbours, for texels are taken for a hundredth larger
+    // than they are.
+    assert!(pmf.len() <= 12, "{} of {} triangles are lights", pmf.len(), 2 * COLUMNS);
+    assert!(pmf[..4].iter().sum::<f32>() > 0.96, "{pmf:?}");
+    assert!((pmf[0] / pmf[3] / 10.0 - 1.0).abs() < 0.1, "{pmf:?}");
     assert_eq!(flatten(&under_a_strip(1)).lights.len(), 2);
 }
 

@@ -28,8 +28,10 @@ fn noise(width: u32, height: u32, seed: u64) -> Environment {
     Environment { width, height, pixels }
 }
 
+/// Under a map a plate of brushed metal, which tells directions apart: to a matte one a map that turns about its normal
+/// is all the same.
 fn under(environment: Environment) -> Scene {
-    let (material, _) = materials().remove(0);
+    let (material, _) = materials().remove(1);
     Scene { environment: Some(environment), ..plate(material, 0.5) }
 }
 
@@ -86,7 +88,7 @@ fn the_pyramid_draws_with_its_density() {
 
 /// What the plate of `under` reflects of a map turned by `turn` radians, by quadrature.
 fn reflected(environment: &Environment, turn: f64) -> DVec3 {
-    let (_, brdf) = materials().remove(0);
+    let (_, brdf) = materials().remove(1);
     let [width, height] = [environment.width as usize, environment.height as usize];
     let texel = |x: i64, y: i64| {
         let (x, y) = (x.rem_euclid(width as i64) as usize, y.clamp(0, height as i64 - 1) as usize);
@@ -267,7 +269,7 @@ fn under_a_sun() {
 #[test]
 fn under_sun_and_sky() {
     let sky = Sky { elevation: 35.0, azimuth: 20.0, ..Sky::default() };
-    let (material, brdf) = materials().remove(0);
+    let (material, brdf) = materials().remove(1);
     let mut scene = plate(material, 0.5);
     sky.surround(&mut scene);
     let sun = scene.sun.expect("a sun");
