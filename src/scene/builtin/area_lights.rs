@@ -30,11 +30,11 @@ pub(super) fn area_lights() -> Scene {
 
     let down = Quat::from_rotation_x(-FRAC_PI_2);
     let lights = [
-        (Outline::Sphere { radius: 0.25 }, Vec3::new(14.0, 9.0, 5.0), Vec3::new(-1.9, 1.9, -0.8), Quat::IDENTITY),
-        (Outline::Rectangle { width: 1.4, height: 0.5 }, Vec3::new(6.0, 6.5, 7.0), Vec3::new(0.0, 2.4, 0.3), down),
+        (Outline::Sphere { radius: 0.25 }, Vec3::new(20.0, 13.0, 7.0), Vec3::new(-1.9, 1.9, -0.8), Quat::IDENTITY),
+        (Outline::Rectangle { width: 1.6, height: 0.6 }, Vec3::new(15.0, 16.0, 17.5), Vec3::new(0.0, 2.3, 0.8), down),
         (
             Outline::Disk { radius: 0.45 },
-            Vec3::new(3.0, 6.0, 11.0),
+            Vec3::new(5.0, 10.0, 18.0),
             Vec3::new(2.3, 1.8, -0.9),
             Quat::from_rotation_y(0.7) * Quat::from_rotation_x(-0.7),
         ),
