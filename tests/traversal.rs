@@ -9,7 +9,7 @@ use restir::scene::bvh;
 use restir::scene::gpu_types::TRIANGLE_ALPHA_MASK;
 use restir::scene::intersect::{Hit, intersect_cpu, intersect_triangle};
 use restir::scene::random::Random;
-use restir::scene::{Shape, AlphaMode, FlatScene, Instance, Material, Mesh, Scene, Texture, TextureRef, Wrap, shapes};
+use restir::scene::{AlphaMode, FlatScene, Instance, Material, Mesh, Scene, Shape, Texture, TextureRef, Wrap, shapes};
 use std::f32::consts::FRAC_PI_2;
 use std::sync::Arc;
 use support::harness::{TestInput, eval_gpu};

@@ -68,14 +68,42 @@ fn walk(
     }
 }
 
-/// Möller and Trumbore 1997: (t, u, v) if 0 < t < `t_max`.
+/// The Plücker product of a ray from the origin and the edge from a to b: exactly the negative for the edge reversed.
+fn edge_product(a: Vec3, b: Vec3, direction: Vec3) -> f32 {
+    (a - b).cross(a + b).dot(direction)
+}
+
+/// Edge tests by Plücker products (Davidovic et al. 2012), rounding let pass: (t, u, v) if 0 < t < `t_max`.
 pub fn intersect_triangle(triangle: &Triangle, origin: Vec3, direction: Vec3, t_max: f32) -> Option<(f32, f32, f32)> {
     let (e1, e2) = (triangle.p1 - triangle.p0, triangle.p2 - triangle.p0);
+    if triangle.shape() != Shape::Triangles {
+        return intersect_shape(triangle, origin, direction, t_max);
+    }
+    let [p0, p1, p2] = [triangle.p0, triangle.p1, triangle.p2].map(|p| p - origin);
+    let [w0, w1, w2] = [(p2, p1), (p0, p2), (p1, p0)].map(|(a, b)| edge_product(a, b, direction));
+    let sum = w0 + w1 + w2;
+    let largest = |v: Vec3| v.abs().max_element();
+    let edge = largest(e1).max(largest(e2));
+    let rounding = 1e-6 * largest(direction) * edge * (largest(p0) + edge);
+    let is_front = sum > 0.0 && w0.min(w1).min(w2) >= -rounding;
+    let is_double_sided = triangle.flags & TRIANGLE_DOUBLE_SIDED != 0;
+    let is_back = sum < 0.0 && w0.max(w1).max(w2) <= rounding && is_double_sided;
+    let normal = e1.cross(e2);
+    let speed = direction.dot(normal).abs();
+    let t = p0.dot(normal) / if is_front { -speed } else { speed };
+    let hits = (is_front || is_back) && t > 0.0 && t < t_max;
+    // `min` and `max` rather than `clamp`, which does not bear a NaN.
+    let u = (w1 / sum).max(0.0).min(1.0);
+    hits.then_some((t, u, (w2 / sum).max(0.0).min(1.0 - u)))
+}
+
+/// A primitive that is no triangle: (t, u, v) as `intersect_shape` of `shaders/scene/bvh.wgsl`.
+fn intersect_shape(triangle: &Triangle, origin: Vec3, direction: Vec3, t_max: f32) -> Option<(f32, f32, f32)> {
+    let (e1, e2) = (triangle.p1 - triangle.p0, triangle.p2 - triangle.p0);
+    let s = origin - triangle.p0;
     if triangle.shape() == Shape::Sphere {
-        let (origin, radius) = (origin - triangle.p0, e1.length());
-        let t = enter_sphere(origin, direction, radius).filter(|t| *t > 0.0 && *t < t_max)?;
-        let normal = (origin + t * direction).normalize();
-        let p = 0.5 * octahedral::encode(normal) + 0.5;
+        let t = enter_sphere(s, direction, e1.length()).filter(|t| *t > 0.0 && *t < t_max)?;
+        let p = 0.5 * octahedral::encode((s + t * direction).normalize()) + 0.5;
         return Some((t, p.x, p.y));
     }
     let p = direction.cross(e2);
@@ -84,16 +112,11 @@ pub fn intersect_triangle(triangle: &Triangle, origin: Vec3, direction: Vec3, t_
     if determinant == 0.0 || culled {
         return None;
     }
-    let inverse = 1.0 / determinant;
-    let s = origin - triangle.p0;
-    let u = s.dot(p) * inverse;
     let q = s.cross(e1);
-    let v = direction.dot(q) * inverse;
-    let t = e2.dot(q) * inverse;
+    let (u, v, t) = (s.dot(p) / determinant, direction.dot(q) / determinant, e2.dot(q) / determinant);
     let is_within = match triangle.shape() {
-        Shape::Rectangle => u >= 0.0 && v >= 0.0 && u <= 1.0 && v <= 1.0,
         Shape::Disk => u * u + v * v <= 1.0,
-        _ => u >= 0.0 && v >= 0.0 && u + v <= 1.0,
+        _ => u >= 0.0 && v >= 0.0 && u <= 1.0 && v <= 1.0,
     };
     (is_within && t > 0.0 && t < t_max).then_some((t, u, v))
 }
