@@ -1,17 +1,18 @@
 //! The uploaded scene: the buffers and textures of bind group 0, all but the frame uniform.
 
+use crate::environment_pyramid::EnvironmentPyramid;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::data_texture::DataTexture;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
-use crate::scene::FlatScene;
-use crate::scene::flat::{FlatInstance, TextureArray, levels};
+use crate::scene::flat::{FlatEnvironment, FlatInstance, TextureArray, levels};
 use crate::scene::gpu_types::{
-    BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, MATERIAL_UNLIT, MATERIAL_VOLUME, MaterialExtensions,
-    NONE, TRIANGLE_ALPHA_MASK,
+    BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, MATERIAL_UNLIT, MATERIAL_VOLUME,
+    MaterialExtensions, NONE, TRIANGLE_ALPHA_MASK,
 };
-use glam::{Mat4, Quat, Vec3, Vec4};
+use crate::scene::{FlatScene, Shape};
+use glam::{Mat4, Quat, UVec2, Vec3, Vec4};
 
 /// Triangles in the first of the two buffers: 128 MiB, what every WebGPU device can bind. As in `shaders/scene/data.wgsl`.
 const FIRST_TRIANGLES: usize = (128 << 20) / size_of::<crate::scene::gpu_types::Triangle>();
@@ -37,6 +38,10 @@ pub struct GpuScene {
     textures: [wgpu::TextureView; TEXTURE_ARRAYS.len()],
     environment_radiance: wgpu::TextureView,
     environment_alias: wgpu::TextureView,
+    /// What stands in for a pyramid that there is not.
+    no_pyramid: wgpu::TextureView,
+    /// Made when the environment is to be sampled by it.
+    pyramid: Option<EnvironmentPyramid>,
     /// The punctual lights as they are uploaded now, from `first_punctual` on.
     punctual: Vec<Light>,
     first_punctual: u32,
@@ -75,8 +80,7 @@ impl GpuScene {
         let point = [bytemuck::Zeroable::zeroed()];
         let transforms: Vec<Mat4> = scene.instances.iter().map(|i| i.transform).collect();
         let first = scene.first_punctual as usize;
-        let punctual: Vec<Light> =
-            scene.lights.iter().skip(first).filter(|l| l.kind != LIGHT_ENVIRONMENT).copied().collect();
+        let punctual: Vec<Light> = scene.lights.iter().skip(first).filter(|l| !is_distant(l)).copied().collect();
         Ok(GpuScene {
             nodes: gpu.storage_of("nodes", &scene.nodes)?,
             triangles: [
@@ -109,6 +113,8 @@ impl GpuScene {
                 wgpu::TextureFormat::Rgba32Uint,
                 bytemuck::cast_slice(alias),
             ),
+            no_pyramid: gpu.texture("no pyramid", UVec2::ONE, wgpu::TextureFormat::Rgba32Float),
+            pyramid: None,
             rest_positions: punctual.iter().map(|l| l.position).collect(),
             punctual,
             first_punctual: scene.first_punctual,
@@ -134,6 +140,31 @@ impl GpuScene {
         }
         let offset = u64::from(self.first_punctual) * std::mem::size_of::<Light>() as u64;
         gpu.queue.write_buffer(&self.lights, offset, bytemuck::cast_slice(&self.punctual));
+    }
+
+    /// Whether the environment is sampled by its pyramid, which [`GpuScene::record`] then makes, or by its alias table.
+    pub fn sample_by_pyramid(&mut self, gpu: &Gpu, by_pyramid: bool) {
+        let size = self.environment_radiance.texture().size();
+        if !by_pyramid || !self.features.environment {
+            self.pyramid = None;
+        } else if self.pyramid.is_none() {
+            self.pyramid = Some(EnvironmentPyramid::new(gpu, size.width, size.height));
+        }
+        self.features.environment_pyramid = self.pyramid.is_some();
+    }
+
+    /// Replaces the environment's radiance and alias table by those of a map of the same size.
+    pub(crate) fn update_environment(&self, gpu: &Gpu, environment: &FlatEnvironment) {
+        write(gpu, self.environment_radiance.texture(), 0, 0, bytemuck::cast_slice(&environment.radiance));
+        write(gpu, self.environment_alias.texture(), 0, 0, bytemuck::cast_slice(&environment.alias));
+    }
+
+    /// What has to be made before the scene can be rendered.
+    ///
+    /// # Errors
+    /// `SHADER` where [`GpuScene::share`] was not called.
+    pub fn record(&self, recorder: &mut Recorder<'_>) -> Result<()> {
+        self.pyramid.as_ref().map_or(Ok(()), |pyramid| pyramid.record(recorder))
     }
 
     /// Moves the instances: `transforms` is object to world of each. The top level is rebuilt over them; where they stood
@@ -184,6 +215,8 @@ impl GpuScene {
         }
         recorder.share("environment_radiance", &self.environment_radiance);
         recorder.share("environment_alias", &self.environment_alias);
+        let pyramid = self.pyramid.as_ref().map_or(&self.no_pyramid, |pyramid| &pyramid.view);
+        recorder.share("environment_pyramid", pyramid);
     }
 }
 
@@ -196,7 +229,10 @@ fn features(scene: &FlatScene) -> SceneFeatures {
         textures_3: scene.textures.len() > 3,
         alpha_masks: scene.triangles.iter().any(|t| t.flags & TRIANGLE_ALPHA_MASK != 0),
         environment: environment_light(scene) != NONE,
-        punctual_lights: scene.lights.iter().any(|l| l.kind != LIGHT_TRIANGLE && l.kind != LIGHT_ENVIRONMENT),
+        sun: sun_light(scene) != NONE,
+        environment_pyramid: false,
+        shapes: scene.triangles.iter().any(|t| t.shape() != Shape::Triangles),
+        punctual_lights: scene.lights.iter().any(|l| l.kind != LIGHT_TRIANGLE && !is_distant(l)),
         instances: scene.has_top_level(),
         many_triangles: scene.triangles.len() > FIRST_TRIANGLES,
         transmission: any(|m| m.transmission > 0.0),
@@ -235,10 +271,22 @@ fn instance_records(scene: &FlatScene, transforms: &[Mat4], previous: &[Mat4]) -
 
 /// Index of the environment among the lights, or `NONE`.
 pub fn environment_light(scene: &FlatScene) -> u32 {
-    match scene.lights.last() {
-        Some(light) if light.kind == LIGHT_ENVIRONMENT => scene.lights.len() as u32 - 1,
-        _ => NONE,
-    }
+    distant_light(scene, LIGHT_ENVIRONMENT)
+}
+
+/// Index of the sun among the lights, or `NONE`.
+pub fn sun_light(scene: &FlatScene) -> u32 {
+    distant_light(scene, LIGHT_SUN)
+}
+
+fn is_distant(light: &Light) -> bool {
+    matches!(light.kind, LIGHT_SUN | LIGHT_ENVIRONMENT)
+}
+
+/// Distant lights are the last.
+fn distant_light(scene: &FlatScene, kind: u32) -> u32 {
+    let last = scene.lights.iter().enumerate().rev().take_while(|(_, light)| is_distant(light));
+    last.into_iter().find(|(_, light)| light.kind == kind).map_or(NONE, |(index, _)| index as u32)
 }
 
 /// An array with all its levels; one white texel for an array that the scene does not have.

@@ -4,6 +4,7 @@
 //! [`Renderer`] that holds one of each.
 
 mod describe;
+mod environment_pyramid;
 pub mod error;
 pub mod film;
 pub mod frame;

@@ -232,6 +232,12 @@ params! {
         energy_compensation: flag(false),
         /// Whether the diffuse lobe gets only the light that the specular layer leaves over. On: energy is conserved. Off: as glTF's formula has it, which gains light at grazing angles.
         conserving_mix: flag(false),
+        /// How directions of the environment are drawn: from an `alias` table made when the scene is loaded, in constant time, or by descent of a `pyramid` made on the GPU every frame (002, section 5.3), which suits maps that change. The same density, so the same expected picture.
+        environment_sampling: choice(0, ["alias", "pyramid"]),
+        /// Turn of environment and sun about +Y, counter-clockwise as seen from above.
+        environment_rotation: float(0.0, -360.0..=360.0, "degrees"),
+        /// How fast they turn while frames are not accumulated.
+        environment_rotation_rate: float(0.0, -360.0..=360.0, "degrees a second"),
     }
 }
 

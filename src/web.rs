@@ -3,7 +3,7 @@
 
 use crate::film::blit::Blit;
 use crate::gpu::{Gpu, GpuOptions, instance};
-use crate::scene::{Camera, Projection, builtin, gltf};
+use crate::scene::{Camera, Projection, builtin, environment, gltf};
 use crate::{Error, FlatScene, Renderer, Scene};
 use glam::{UVec2, Vec3};
 use wasm_bindgen::prelude::*;
@@ -40,7 +40,27 @@ pub fn describe() -> String {
     crate::describe().to_string()
 }
 
-fn flatten(mut scene: Scene, lights: u32, seed: u32, progress: &js_sys::Function) -> JsResult<Vec<u8>> {
+/// What surrounds a scene instead of its own environment: `sky...` or `white`, or the bytes of a map of that name.
+type Surroundings = (Option<String>, Option<Vec<u8>>);
+
+fn surround(scene: &mut Scene, surroundings: Surroundings) -> crate::Result<()> {
+    match surroundings {
+        (Some(name), Some(bytes)) => environment::surround(scene, &name, &bytes),
+        (Some(name), None) if !scene.surround(&name)? => {
+            Err(Error::Unknown { kind: "environment", name, known: "sky, white".into() })
+        }
+        _ => Ok(()),
+    }
+}
+
+fn flatten(
+    mut scene: Scene,
+    lights: u32,
+    seed: u32,
+    surroundings: Surroundings,
+    progress: &js_sys::Function,
+) -> JsResult<Vec<u8>> {
+    surround(&mut scene, surroundings).js()?;
     scene.ensure_light(lights, seed.into());
     let mut report = |fraction: f32, what: &str| {
         let _ = progress.call2(&JsValue::NULL, &fraction.into(), &what.into());
@@ -49,10 +69,18 @@ fn flatten(mut scene: Scene, lights: u32, seed: u32, progress: &js_sys::Function
     Ok(flat.to_bytes())
 }
 
-/// A built-in scene as `FlatScene` bytes. For a Worker.
+/// A built-in scene as `FlatScene` bytes, surrounded by `environment`: `sky...`, `white`, or the name of `map`, the bytes
+/// of an .hdr or .exr file. For a Worker.
 #[wasm_bindgen]
-pub fn flatten_builtin(name: &str, lights: u32, seed: u32, progress: &js_sys::Function) -> JsResult<Vec<u8>> {
-    flatten(builtin::make(name).js()?, lights, seed, progress)
+pub fn flatten_builtin(
+    name: &str,
+    lights: u32,
+    seed: u32,
+    environment: Option<String>,
+    map: Option<Vec<u8>>,
+    progress: &js_sys::Function,
+) -> JsResult<Vec<u8>> {
+    flatten(builtin::make(name).js()?, lights, seed, (environment, map), progress)
 }
 
 /// A glTF file as `FlatScene` bytes; `resolve(uri)` gives the bytes of a file beside it, or undefined. For a Worker.
@@ -63,6 +91,8 @@ pub fn flatten_file(
     resolve: &js_sys::Function,
     lights: u32,
     seed: u32,
+    environment: Option<String>,
+    map: Option<Vec<u8>>,
     progress: &js_sys::Function,
 ) -> JsResult<Vec<u8>> {
     let mut find = |uri: &str| {
@@ -75,7 +105,7 @@ pub fn flatten_file(
                 Error::bad_file(name, uri, "refers to a file that was not given; choose all its files at once")
             })
     };
-    flatten(gltf::load_bytes(name, bytes, &mut find).js()?, lights, seed, progress)
+    flatten(gltf::load_bytes(name, bytes, &mut find).js()?, lights, seed, (environment, map), progress)
 }
 
 /// A renderer that presents to a canvas.

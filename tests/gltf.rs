@@ -919,6 +919,7 @@ fn broken_radiance_environments_are_refused() {
         ("absurdly wide and high", sized(u32::MAX, u32::MAX), "UNSUPPORTED"),
         ("too many texels", sized(16_000, 16_000), "LIMIT"),
         ("larger than its bytes", sized(8000, 4000), "BAD_FILE"),
+        ("a bomb", [hdr_file("", 8192, 4096, &[[9, 9, 9, 128]]), [[1, 1, 1, 255]; 3].concat()].concat(), "BAD_FILE"),
         ("exposed to nothing", hdr_file("EXPOSURE=0\n", 2, 2, &[[128; 4]; 4]), "BAD_FILE"),
         ("another colour space", b"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n1111".to_vec(), "UNSUPPORTED"),
         ("upside down", b"#?RADIANCE\n\n+Y 1 +X 1\n1111".to_vec(), "UNSUPPORTED"),

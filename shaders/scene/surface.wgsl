@@ -70,11 +70,25 @@ fn triangle_normal(instance: u32, triangle: u32) -> vec3f {
 
 fn triangle_point(instance: u32, triangle: u32, uv: vec2f) -> vec3f {
     let t = load_triangle(triangle);
-    let point = t.p0 + uv.x * (t.p1 - t.p0) + uv.y * (t.p2 - t.p0);
+    var point = t.p0 + uv.x * (t.p1 - t.p0) + uv.y * (t.p2 - t.p0);
+    if is_sphere(t.flags) {
+        point = t.p0 + length(t.p1 - t.p0) * sphere_normal(uv);
+    }
     if !scene_has_instances {
         return point;
     }
     return instance_point(instance, TO_WORLD, point);
+}
+
+// Unit, out of the front of any primitive at a point of it.
+fn front_normal(instance: u32, triangle: u32, uv: vec2f) -> vec3f {
+    if !is_sphere(load_triangle(triangle).flags) {
+        return normalize(triangle_normal(instance, triangle));
+    }
+    if !scene_has_instances {
+        return sphere_normal(uv);
+    }
+    return normalize(instance_normal(instance, sphere_normal(uv)));
 }
 
 // A bound on the distance, along the normal, between a point computed on a triangle and the plane that rays from there are
@@ -83,9 +97,13 @@ fn triangle_point(instance: u32, triangle: u32, uv: vec2f) -> vec3f {
 // Humphreys 2016, section 3.9; the constants are ours and tests/watertight.rs tests them.
 fn triangle_error(instance: u32, triangle: u32, unit_normal: vec3f) -> f32 {
     let corners = triangle_corners(instance, triangle);
-    let largest = max(max(abs(corners.p0), abs(corners.p1)), abs(corners.p2));
+    var largest = max(max(abs(corners.p0), abs(corners.p1)), abs(corners.p2));
     let e1 = corners.p1 - corners.p0;
     let e2 = corners.p2 - corners.p0;
+    if scene_has_shapes {
+        // Their points may lie beyond the corners.
+        largest += abs(e1) + abs(e2);
+    }
     let lengths = vec2f(length(e1), length(e2));
     let sliver = lengths.x * lengths.y * max(lengths.x, lengths.y) / max(length(cross(e1, e2)), 1e-30);
     let error = 4.8e-7 * dot(abs(unit_normal), largest) + 2.4e-7 * sliver;
@@ -122,6 +140,9 @@ struct ShadingFrame {
 }
 
 fn shading_frame(triangle: u32, uv: vec2f) -> ShadingFrame {
+    if is_sphere(load_triangle(triangle).flags) {
+        return ShadingFrame(vec3f(0.0), vec3f(0.0), sphere_normal(uv), false);
+    }
     let w = vec3f(1.0 - uv.x - uv.y, uv.x, uv.y);
     let a = load_attributes(triangle);
     let n0 = decode_normal(a.normals.x);
@@ -193,7 +214,7 @@ fn load_surface(instance: u32, triangle: u32, uv: vec2f, wo: vec3f, footprint: f
         surface.light += instance_first_light(instance);
     }
 
-    let front = normalize(triangle_normal(instance, triangle));
+    let front = front_normal(instance, triangle, uv);
     surface.is_front = dot(front, wo) >= 0.0;
     let side = select(-1.0, 1.0, surface.is_front);
     surface.geometric_normal = front * side;

@@ -108,6 +108,12 @@ scene_features! {
     alpha_masks,
     /// An environment.
     environment,
+    /// A sun.
+    sun,
+    /// Primitives other than triangles.
+    shapes,
+    /// A pyramid by which the environment is sampled, rather than by its alias table.
+    environment_pyramid,
     /// Any point, spot or directional light.
     punctual_lights,
     /// A top level: more than one mesh that is in world space already.

@@ -2,7 +2,8 @@
 //!
 //! `gpu_struct!` registers a struct's size and field offsets in its `LAYOUT`; [`crate::gpu_layouts`] lists them all.
 
-use glam::{Mat4, Vec2, Vec3, Vec4};
+use super::Shape;
+use glam::{Mat4, Vec2, Vec3, Vec4, Vec4Swizzles};
 
 /// Size and field offsets of one Rust struct with a WGSL twin.
 #[derive(Debug, Clone, Copy)]
@@ -51,6 +52,44 @@ pub struct BvhNode {
 }
 }
 
+/// [`Triangle::flags`]: two bits from here on are the [`Shape`].
+pub const SHAPE_SHIFT: u32 = 28;
+
+impl Triangle {
+    /// What the three points are.
+    pub fn shape(&self) -> Shape {
+        [Shape::Triangles, Shape::Rectangle, Shape::Disk, Shape::Sphere][(self.flags >> SHAPE_SHIFT & 3) as usize]
+    }
+
+    /// Low and high corner of the box round it.
+    pub(crate) fn bounds(&self) -> [Vec3; 2] {
+        let Triangle { p0, p1, p2, .. } = *self;
+        let (e1, e2) = (p1 - p0, p2 - p0);
+        // What arithmetic rounds must not stick out.
+        let extended = |half: Vec3| {
+            let half = half + 1e-6 * (half + p0.abs());
+            [p0 - half, p0 + half]
+        };
+        match self.shape() {
+            Shape::Triangles => [p0.min(p1).min(p2), p0.max(p1).max(p2)],
+            Shape::Rectangle => {
+                let p3 = p1 + e2;
+                [p0.min(p1).min(p2).min(p3), p0.max(p1).max(p2).max(p3)]
+            }
+            Shape::Disk => extended((e1 * e1 + e2 * e2).map(f32::sqrt)),
+            Shape::Sphere => extended(Vec3::splat(e1.length())),
+        }
+    }
+}
+
+impl TriangleAttributes {
+    /// Texture coordinates of the corners in a UV set, 0 or 1.
+    pub(crate) fn uvs(&self, set: usize) -> [Vec2; 3] {
+        let TriangleAttributes { uv_a, uv_b, uv_c, .. } = self;
+        if set == 0 { [uv_a.xy(), uv_a.zw(), uv_b.xy()] } else { [uv_b.zw(), uv_c.xy(), uv_c.zw()] }
+    }
+}
+
 /// [`Triangle::flags`]: the back is a surface too.
 pub const TRIANGLE_DOUBLE_SIDED: u32 = 1;
 /// [`Triangle::flags`]: alpha has to be tested.
@@ -64,7 +103,7 @@ gpu_struct! {
 pub struct Triangle {
     /// First corner.
     pub p0: Vec3,
-    /// `TRIANGLE_*` bits.
+    /// `TRIANGLE_*` bits, and the shape from bit [`SHAPE_SHIFT`] on.
     pub flags: u32,
     /// Second corner.
     pub p1: Vec3,
@@ -342,6 +381,8 @@ pub const LIGHT_SPOT: u32 = 2;
 pub const LIGHT_DIRECTIONAL: u32 = 3;
 /// [`Light::kind`]: the environment.
 pub const LIGHT_ENVIRONMENT: u32 = 4;
+/// [`Light::kind`]: the sun.
+pub const LIGHT_SUN: u32 = 5;
 
 gpu_struct! {
 /// One light with its entry in the alias table: 112 bytes.
@@ -354,13 +395,13 @@ pub struct Light {
     pub previous_position: Vec3,
     /// Index of the triangle of an emissive triangle.
     pub triangle: u32,
-    /// Unit direction in which a spot or directional light shines.
+    /// Unit direction in which a spot, a directional light or the sun shines.
     pub direction: Vec3,
     /// Range in metres; 0 for unlimited.
     pub range: f32,
-    /// Candela (point, spot) or lux (directional), linear Rec. 709.
+    /// Candela (point, spot), lux (directional) or radiance (sun), linear Rec. 709.
     pub intensity: Vec3,
-    /// cos of the spot's outer angle.
+    /// cos of the spot's outer angle; 1 - cos of the sun's angular radius.
     pub cos_outer: f32,
     /// cos of the spot's inner angle.
     pub cos_inner: f32,

@@ -4,6 +4,7 @@
 //! thing as plain arrays with a BVH, ready for upload.
 
 pub mod alias;
+pub mod area_light;
 pub mod builtin;
 pub mod bvh;
 pub mod environment;
@@ -18,6 +19,7 @@ mod material;
 pub mod octahedral;
 pub mod random;
 pub mod shapes;
+pub mod sky;
 pub mod tangents;
 
 pub use flat::FlatScene;
@@ -48,6 +50,8 @@ pub struct Scene {
     pub lights: Vec<PunctualLight>,
     /// Light from infinitely far away, if any.
     pub environment: Option<Environment>,
+    /// The sun, if any: seen in front of the environment, and turned with it.
+    pub sun: Option<Sun>,
     /// Cameras of the file, in file order; may be empty.
     pub cameras: Vec<Camera>,
     /// How lights move; empty for a static scene.
@@ -56,9 +60,25 @@ pub struct Scene {
     pub warnings: Vec<String>,
 }
 
+/// What three indices of a [`Mesh`] stand for. With the edges e1 and e2 from the first point to the others:
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Shape {
+    /// A triangle.
+    #[default]
+    Triangles,
+    /// The parallelogram of the edges.
+    Rectangle,
+    /// The ellipse round the first point with the edges for half axes.
+    Disk,
+    /// The sphere round the first point through the second. It is seen from outside only.
+    Sphere,
+}
+
 /// One indexed triangle list with one material.
 #[derive(Debug, Clone, Default)]
 pub struct Mesh {
+    /// What the indices stand for. Only triangles take textures and alpha masks as one expects.
+    pub shape: Shape,
     /// Object-space positions.
     pub positions: Vec<Vec3>,
     /// Object-space unit normals, one a position.
@@ -301,6 +321,30 @@ impl Environment {
     /// The same radiance from everywhere.
     pub fn even(radiance: Vec3) -> Self {
         Environment { width: 1, height: 1, pixels: vec![radiance.to_array()] }
+    }
+}
+
+/// A disk of even radiance, infinitely far away.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sun {
+    /// Unit direction towards its centre.
+    pub direction: Vec3,
+    /// Irradiance of a surface that faces it, linear Rec. 709.
+    pub irradiance: Vec3,
+    /// Half the angle under which it is seen, in radians, at most a right angle.
+    pub angular_radius: f32,
+}
+
+impl Sun {
+    /// 1 - cos(angular radius).
+    pub(crate) fn height(&self) -> f64 {
+        2.0 * (0.5 * f64::from(self.angular_radius)).sin().powi(2)
+    }
+
+    /// Its radiance: irradiance over projected solid angle, pi sin^2 of the angular radius.
+    pub fn radiance(&self) -> Vec3 {
+        let sin = f64::from(self.angular_radius).sin();
+        (self.irradiance.as_dvec3() / (std::f64::consts::PI * sin * sin)).as_vec3()
     }
 }
 

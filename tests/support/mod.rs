@@ -4,6 +4,7 @@
 pub mod bsdf;
 pub mod gltf_writer;
 pub mod harness;
+pub mod plate;
 pub mod shader_copy;
 pub mod statistics;
 pub mod twins;

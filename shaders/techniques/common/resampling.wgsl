@@ -14,7 +14,7 @@ fn target_function(surface: Surface, sample: LightSample, previous: bool) -> f32
 
 // Resampling weight w = m p-hat / p of one candidate, with m = 1 / M for M candidates of one kind.
 fn candidate_weight(surface: Surface, sample: LightSample, candidate_count: u32) -> f32 {
-    let pdf = light_sample_pdf(sample);
+    let pdf = light_sample_pdf(surface.position, sample);
     if pdf <= 0.0 {
         return 0.0;
     }

@@ -14,10 +14,10 @@ fn continuation_probability(throughput: vec3f) -> f32 {
 
 // Next-event estimation: the light that one light sample brings to the surface, weighted against BRDF sampling.
 fn estimate_direct_light(surface: Surface, rng: ptr<function, Rng>) -> vec3f {
-    let sample = light_sample(rng);
+    let sample = light_sample(surface.position, rng);
     let light = light_contribution(sample, surface.position, false);
     let scattered = surface_scatter(surface, light.direction, light.distance) * light.value;
-    let pdf = light_sample_pdf(sample);
+    let pdf = light_sample_pdf(surface.position, sample);
     if luminance(scattered) <= 0.0 || pdf <= 0.0 || !is_visible(surface, light.direction, light.distance) {
         return vec3f(0.0);
     }
@@ -31,15 +31,22 @@ fn estimate_direct_light(surface: Surface, rng: ptr<function, Rng>) -> vec3f {
 
 // Light that a ray drawn with density `brdf_pdf` found by itself, weighted against next-event estimation.
 fn weighted_emission(surface: Surface, direction: vec3f, distance: f32, brdf_pdf: f32) -> vec3f {
-    let pdf = light_hit_pdf(surface.light, surface.instance, surface.triangle, direction, distance);
+    let start = surface.position - distance * direction;
+    let pdf = light_hit_pdf(surface.light, surface.instance, surface.triangle, start, direction, distance);
     return surface.emission * mis_weight(frame.mis_heuristic, brdf_pdf, pdf);
 }
 
+// The same for a ray that left the scene. Map and sun are two lights, each weighted by its own density.
 fn weighted_environment(direction: vec3f, brdf_pdf: f32) -> vec3f {
-    if !scene_has_environment {
-        return vec3f(0.0);
+    var radiance = vec3f(0.0);
+    if scene_has_environment {
+        let weight = mis_weight(frame.mis_heuristic, brdf_pdf, environment_hit_pdf(direction));
+        radiance += environment_map_radiance(direction) * weight;
     }
-    return environment_evaluate(direction) * mis_weight(frame.mis_heuristic, brdf_pdf, environment_hit_pdf(direction));
+    if scene_has_sun {
+        radiance += sun_radiance(direction) * mis_weight(frame.mis_heuristic, brdf_pdf, sun_hit_pdf());
+    }
+    return radiance;
 }
 
 // The colour that a path carries from its first dispersing medium on (KHR_materials_dispersion): one of three by chance,

@@ -4,15 +4,16 @@ use crate::failure::{Failure, Result};
 use crate::progress;
 use restir::Error;
 use restir::scene::{Camera, FlatScene, Scene, builtin, environment, gltf};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// What lights a scene beyond its own lights.
 #[derive(clap::Args)]
 pub struct Lighting {
-    /// Environment map (equirectangular OpenEXR or Radiance .hdr, linear Rec. 709), instead of the scene's own.
-    #[arg(long, value_name = "FILE")]
-    pub environment: Option<PathBuf>,
-    /// Point lights to scatter in a scene that has no light at all; without this it gets an even white sky.
+    /// What surrounds the scene, instead of its own: an environment map (equirectangular OpenEXR or Radiance .hdr, linear
+    /// Rec. 709); `sky` or sky:elevation=40,azimuth=135,turbidity=2.5,albedo=0.3,intensity=5; or `white`.
+    #[arg(long, value_name = "FILE|sky|white")]
+    pub environment: Option<String>,
+    /// Point lights to scatter in a scene that has no light at all; without this it gets sun and sky.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub lights: Option<u32>,
 }
@@ -32,13 +33,10 @@ pub fn load(name: &str) -> Result<Scene> {
 
 /// Adds the environment given, or, where there is no light at all, scattered lights or a sky.
 pub fn light(scene: &mut Scene, lighting: &Lighting, seed: u32) -> Result<()> {
-    if let Some(file) = &lighting.environment {
-        let (environment, clamped) = environment::load_file(file)?;
-        scene.environment = Some(environment);
-        if clamped > 0 {
-            let (file, most) = (file.display(), environment::MAX_RADIANCE);
-            scene.warnings.push(format!("{file}: {clamped} values were not within 0 and {most:e} and were clamped"));
-        }
+    if let Some(name) = &lighting.environment
+        && !scene.surround(name).map_err(Failure::from_option)?
+    {
+        environment::surround_by_file(scene, Path::new(name))?;
     }
     let own = scene.lights.len();
     scene.ensure_light(lighting.lights.unwrap_or(0), seed.into());

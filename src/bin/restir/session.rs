@@ -8,6 +8,9 @@ use restir::scene::flat::SceneStats;
 use restir::{Gpu, GpuOptions, Renderer, techniques};
 use std::time::Instant;
 
+/// The parameter that turns the environment, which is then something that moves.
+const TURN: &str = "render.environment_rotation_rate";
+
 /// What is rendered, and how.
 #[derive(clap::Args)]
 pub struct Options {
@@ -77,7 +80,9 @@ impl Session {
         report::warnings(&flat.warnings);
         let camera = scene::camera(&flat.cameras, options.camera.as_deref())?.clone();
         let (scene, stats, warnings) = (flat.name.clone(), flat.stats.clone(), flat.warnings.clone());
-        let moving = !flat.motions.is_empty();
+        let turns =
+            options.set.iter().any(|(key, value)| key == TURN && value.parse::<f32>().is_ok_and(|rate| rate != 0.0));
+        let moving = turns || !flat.motions.is_empty();
 
         let gpu = block_on(Gpu::headless(&GpuOptions { default_limits: false }))?;
         let adapter = gpu.adapter_name();

@@ -1,5 +1,6 @@
 //! Procedural, seeded scenes.
 
+mod area_lights;
 mod cornell;
 mod furnace;
 mod glossy_spheres;
@@ -75,6 +76,12 @@ pub const ALL: &[BuiltinInfo] = &[
         doc: "A row of spheres for each lobe: anisotropy, iridescence, sheen, clearcoat, thin walls, glass, index of refraction.",
         example: "materials",
     },
+    BuiltinInfo {
+        name: "area-lights",
+        title: "Area lights",
+        doc: "A few things on a floor under a sphere, a rectangle and a disk of light.",
+        example: "area-lights",
+    },
 ];
 
 /// Makes a built-in scene; the same name gives the same scene.
@@ -93,6 +100,7 @@ pub fn make(name: &str) -> Result<Scene> {
         "many-lights" => {
             Err(Error::bad_value("many-lights:N", "the number of lights is missing, as in many-lights:10000"))
         }
+        "area-lights" => Ok(area_lights::area_lights()),
         "glossy-spheres" => Ok(glossy_spheres::glossy_spheres()),
         "materials" => Ok(materials::materials()),
         _ => Err(Error::Unknown {

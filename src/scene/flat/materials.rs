@@ -93,7 +93,7 @@ fn wrap_bits(wrap: Wrap) -> u32 {
 
 /// KHR_texture_transform: translation x rotation x scale. V points down, so that turning the coordinates
 /// counter-clockwise, as seen on the image, takes (1, 0) to (cos, -sin).
-fn uv_rows(reference: &TextureRef) -> [Vec3; 2] {
+pub(super) fn uv_rows(reference: &TextureRef) -> [Vec3; 2] {
     let (sin, cos) = reference.rotation.sin_cos();
     let TextureRef { scale, offset, .. } = reference;
     [Vec3::new(cos * scale.x, sin * scale.y, offset.x), Vec3::new(-sin * scale.x, cos * scale.y, offset.y)]

@@ -1,6 +1,8 @@
 //! A scene as plain arrays with a BVH: what is uploaded, sent from a Worker to the page, and kept to rebuild a lost device.
 
 mod bytes;
+mod emission;
+pub(crate) mod environment;
 mod extensions;
 mod framing;
 pub(crate) mod levels;
@@ -12,11 +14,10 @@ mod textures;
 mod triangles;
 mod validate;
 
+pub use environment::FlatEnvironment;
 pub(super) use triangles::face_normal;
 
-use super::gpu_types::{
-    BvhNode, EnvironmentTexel, Light, Material, MaterialExtensions, NONE, Triangle, TriangleAttributes,
-};
+use super::gpu_types::{BvhNode, Light, Material, MaterialExtensions, NONE, Triangle, TriangleAttributes};
 use super::{Camera, LightMotion, MAX_COORDINATE, Projection, PunctualKind, Scene, bvh};
 use crate::error::{Error, Result};
 use glam::{Mat4, Vec3};
@@ -75,19 +76,6 @@ pub struct TextureStats {
     pub used_bytes: u64,
 }
 
-/// The environment with its alias table.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FlatEnvironment {
-    /// Width in texels.
-    pub width: u32,
-    /// Height in texels.
-    pub height: u32,
-    /// Linear radiance, RGB and an unused 1.
-    pub radiance: Vec<[f32; 4]>,
-    /// One entry a texel.
-    pub alias: Vec<EnvironmentTexel>,
-}
-
 /// What a scene holds, for reports.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SceneStats {
@@ -105,7 +93,7 @@ pub struct SceneStats {
     pub textures: u64,
     /// The arrays that their images lie in.
     pub texture_arrays: Vec<TextureStats>,
-    /// Lights: emissive triangles + punctual lights + environment.
+    /// Lights: emissive triangles + punctual lights + sun + environment.
     pub lights: u64,
     /// Emissive triangles among them.
     pub emissive_triangles: u64,
@@ -171,7 +159,7 @@ pub struct FlatScene {
     pub materials: Vec<Material>,
     /// What glTF's extensions add to each material; empty where no material uses one.
     pub material_extensions: Vec<MaterialExtensions>,
-    /// With alias table; the environment, if any, is the last. May be empty.
+    /// With alias table; the sun and the environment, if any, are the last. May be empty.
     pub lights: Vec<Light>,
     /// Index in `lights` of the first punctual light; they follow in the order of [`Scene::lights`].
     pub first_punctual: u32,
@@ -218,11 +206,13 @@ impl FlatScene {
 
         progress(0.9, "weighing lights");
         let environment = match &scene.environment {
-            Some(environment) => lights::environment(environment)?,
+            Some(environment) => FlatEnvironment::build(environment)?,
             None => None,
         };
-        let emitters = lights::emitters(&mut triangles, &meshes, &mut instances, &materials);
-        let (lights, first_punctual) = lights::build(emitters, &scene.lights, environment.is_some())?;
+        let emission = emission::Emission::new(scene);
+        let emitters = lights::emitters(&mut triangles, &meshes, &mut instances, &attributes, &emission);
+        let (lights, first_punctual) =
+            lights::build(emitters, &scene.lights, scene.sun.as_ref(), environment.is_some())?;
         for motion in &scene.motions {
             if motion.light as usize >= scene.lights.len() {
                 return Err(Error::bad_value("light motion", format!("there is no light {}", motion.light)));

@@ -5,7 +5,7 @@ use super::packing::{MAX_ARRAYS, MAX_LAYERS, MAX_SIDE};
 use super::{FlatEnvironment, FlatScene, TextureArray};
 use crate::scene::bvh::{MAX_DEPTH, MAX_TOP_DEPTH};
 use crate::scene::gpu_types::{
-    LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, Material, MaterialExtensions, NONE, TextureSlot, Triangle,
+    LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, Material, MaterialExtensions, NONE, TextureSlot, Triangle,
     TriangleAttributes,
 };
 use std::ops::Range;
@@ -213,6 +213,11 @@ fn check_light(scene: &FlatScene, index: usize, light: &Light) -> Result<(), &'s
     match light.kind {
         // That it is the triangle it says it is, `emitters` has seen.
         LIGHT_TRIANGLE => must(index < scene.first_punctual as usize, "a triangle out of place"),
+        LIGHT_SUN => {
+            let only_environment_follows =
+                scene.lights.get(index + 1..).is_some_and(|rest| rest.iter().all(|l| l.kind == LIGHT_ENVIRONMENT));
+            must(only_environment_follows && light.cos_outer > 0.0, "a sun out of place")
+        }
         LIGHT_ENVIRONMENT => must(is_last && scene.environment.is_some(), "an environment out of place"),
         kind => must(kind < LIGHT_ENVIRONMENT && index >= scene.first_punctual as usize, "an unknown kind"),
     }

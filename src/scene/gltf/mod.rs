@@ -8,6 +8,7 @@
 //! the crate's typed JSON (`gltf::json`) is read directly rather than through its iterators, which panic.
 
 mod accessor;
+mod area_lights;
 mod buffers;
 mod camera;
 mod container;

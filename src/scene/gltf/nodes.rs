@@ -3,7 +3,7 @@
 use super::buffers::Buffers;
 use super::container::Document;
 use super::mesh::{self, Budget};
-use super::{MAX_INSTANCES, camera, lights};
+use super::{MAX_INSTANCES, area_lights, camera, lights};
 use crate::error::Result;
 use crate::scene::{Camera, Instance, MAX_TRIANGLES, Scene};
 use glam::{Mat4, Quat, Vec3, Vec4};
@@ -118,6 +118,11 @@ impl Loader<'_> {
                 Some(light) => self.scene.lights.push(light),
                 None => self.scene.warnings.push(format!("{place}: its light is left out: its scale is zero")),
             }
+        }
+        if let Some(light) = area_lights::read(self.document, node, &place)?
+            && let Err(error) = self.scene.add_area_light(&light, to_world)
+        {
+            self.scene.warnings.push(format!("{place}: its area light is left out: {error}"));
         }
         if let Some(camera) = node.camera {
             match camera::load(self.document, camera.value(), &to_world, node, &place)? {
