@@ -25,7 +25,7 @@ pub fn load(name: &str) -> Result<Scene> {
     let path = Path::new(name);
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     match extension.as_str() {
-        "glb" | "gltf" => Ok(gltf::load_file(path)?),
+        "glb" | "gltf" => Ok(gltf::load_file(path, &gltf::Options::default())?),
         _ => Err(Failure::usage("SCENE", format!("'{name}' is neither a .glb or .gltf file nor builtin:NAME"))),
     }
 }
