@@ -14,6 +14,8 @@ pub mod gltf;
 pub mod gpu_types;
 pub mod intersect;
 mod lights;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod obj;
 pub mod octahedral;
 pub mod random;
 pub mod shapes;

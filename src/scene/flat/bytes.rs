@@ -13,7 +13,8 @@ use serde::{Deserialize, Serialize};
 const _: () = assert!(cfg!(target_endian = "little"), "arrays are copied as they lie in memory");
 
 const MAGIC: [u8; 4] = *b"RSTR";
-const VERSION: u32 = 1;
+/// Of the layout: to be raised by each change to the header, the arrays or their elements.
+pub(super) const VERSION: u32 = 1;
 const PREFIX: usize = 16;
 const ALIGNMENT: usize = 16;
 

@@ -2,6 +2,7 @@
 
 mod atlas;
 mod bytes;
+pub mod cooked;
 mod framing;
 mod lights;
 mod materials;

@@ -26,6 +26,8 @@ mod variants;
 #[cfg(not(target_arch = "wasm32"))]
 pub use decoders::Linked;
 pub use decoders::{DECODED_EXTENSIONS, Decoders, DracoMesh, Fault, Limits, Picture};
+#[cfg(not(target_arch = "wasm32"))]
+pub(super) use uri::relative_path;
 
 use super::Scene;
 use crate::error::Result;
@@ -103,6 +105,15 @@ pub struct Contents {
 /// As [`load_bytes`], for the file's container, version and required extensions.
 pub fn contents(name: &str, bytes: &[u8]) -> Result<Contents> {
     container::contents(name, bytes)
+}
+
+/// As [`contents`], of a file on disk.
+///
+/// # Errors
+/// [`Error::Io`](crate::Error::Io) where it cannot be read, else as [`contents`].
+#[cfg(not(target_arch = "wasm32"))]
+pub fn contents_of_file(path: &std::path::Path) -> Result<Contents> {
+    contents(&path.display().to_string(), &crate::scene::files::read(path, MAX_BUFFER_BYTES)?)
 }
 
 /// Loads a `.glb` or `.gltf` file; external buffers and images are read from beside it.
