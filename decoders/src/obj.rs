@@ -29,10 +29,13 @@ pub struct Converted {
 pub fn to_glb(bytes: &[u8], resolve: Resolve) -> Result<Converted> {
     let resolve = RefCell::new(resolve);
     let warnings = RefCell::new(Vec::new());
+    // Comments and names may be in any encoding; numbers are not.
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let library = |path: &Path| {
         let name = path.to_string_lossy().replace('\\', "/");
         let bytes = (resolve.borrow_mut())(&name);
-        let loaded = bytes.ok_or(LoadError::OpenFileFailed).and_then(|mtl| tobj::load_mtl_buf(&mut Cursor::new(mtl)));
+        let loaded =
+            bytes.ok_or(LoadError::OpenFileFailed).and_then(|mtl| tobj::load_mtl_buf(&mut Cursor::new(text(&mtl))));
         if let Err(error) = &loaded {
             let why = if *error == LoadError::OpenFileFailed { "it was not found".into() } else { error.to_string() };
             warnings.borrow_mut().push(format!("material library {}: {why}; its materials are grey", tidy(&name)));
@@ -40,7 +43,7 @@ pub fn to_glb(bytes: &[u8], resolve: Resolve) -> Result<Converted> {
         loaded
     };
     let options = LoadOptions { triangulate: true, single_index: true, ignore_points: true, ignore_lines: true };
-    let loaded = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, library);
+    let loaded = tobj::load_obj_buf(&mut Cursor::new(text(bytes)), &options, library);
     let (models, materials) = loaded.map_err(|error| broken(format!("OBJ: {error}")))?;
 
     let mut writer = Writer::default();
