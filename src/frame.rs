@@ -40,8 +40,8 @@ pub struct Frame {
     pub history: u32,
     /// 0 box, 1 centre.
     pub pixel_filter: u32,
-    /// Unused.
-    pub padding: u32,
+    /// Root of the top-level BVH in `nodes`.
+    pub top_level: u32,
 }
 }
 

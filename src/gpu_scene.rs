@@ -2,19 +2,31 @@
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::gpu::data_texture::DataTexture;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
 use crate::scene::FlatScene;
-use crate::scene::gpu_types::{LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK};
-use glam::{Quat, Vec3};
+use crate::scene::flat::{FlatInstance, levels};
+use crate::scene::gpu_types::{BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK};
+use glam::{Mat4, Quat, Vec3, Vec4};
+
+/// Triangles in the first of the two buffers: 128 MiB, what every WebGPU device can bind. As in `shaders/scene/data.wgsl`.
+const FIRST_TRIANGLES: usize = (128 << 20) / size_of::<crate::scene::gpu_types::Triangle>();
 
 /// A [`FlatScene`] on the device.
 #[derive(Debug)]
 pub struct GpuScene {
     nodes: wgpu::Buffer,
-    triangles: wgpu::Buffer,
-    materials: wgpu::Buffer,
+    /// The first [`FIRST_TRIANGLES`], and all others.
+    triangles: [wgpu::Buffer; 2],
     lights: wgpu::Buffer,
+    attributes: DataTexture,
+    materials: DataTexture,
+    instances: DataTexture,
+    /// Object to world of each instance in the frame that is uploaded.
+    transforms: Vec<Mat4>,
+    /// Index in `nodes` of the root of everything.
+    top_level: u32,
     atlas: wgpu::TextureView,
     environment_radiance: wgpu::TextureView,
     environment_alias: wgpu::TextureView,
@@ -56,13 +68,23 @@ impl GpuScene {
             Some(e) => ([e.width, e.height, 1], &e.radiance, &e.alias),
             None => (black.0, &black.1, &black.2),
         };
+        let (first_triangles, rest) = scene.triangles.split_at(scene.triangles.len().min(FIRST_TRIANGLES));
+        let point = [bytemuck::Zeroable::zeroed()];
+        let transforms: Vec<Mat4> = scene.instances.iter().map(|i| i.transform).collect();
         let first = scene.first_punctual as usize;
         let punctual: Vec<Light> =
             scene.lights.iter().skip(first).filter(|l| l.kind != LIGHT_ENVIRONMENT).copied().collect();
         Ok(GpuScene {
             nodes: gpu.storage_of("nodes", &scene.nodes)?,
-            triangles: gpu.storage_of("triangles", &scene.triangles)?,
-            materials: gpu.storage_of("materials", &scene.materials)?,
+            triangles: [
+                gpu.storage_of("triangles", first_triangles)?,
+                gpu.storage_of("the triangles after the first 2796202", if rest.is_empty() { &point } else { rest })?,
+            ],
+            attributes: DataTexture::new(gpu, "attributes", &scene.attributes)?,
+            materials: DataTexture::new(gpu, "materials", &scene.materials)?,
+            instances: DataTexture::new(gpu, "instances", &instance_records(scene, &transforms, &transforms))?,
+            transforms,
+            top_level: scene.root(),
             lights: if scene.lights.is_empty() {
                 gpu.storage("lights", std::mem::size_of::<Light>() as u64)?
             } else {
@@ -115,6 +137,33 @@ impl GpuScene {
         gpu.queue.write_buffer(&self.lights, offset, bytemuck::cast_slice(&self.punctual));
     }
 
+    /// Moves the instances: `transforms` is object to world of each. The top level is rebuilt over them; where they stood
+    /// before becomes the previous frame's place. A transform that cannot be undone hides its instance.
+    pub fn place(&mut self, gpu: &Gpu, scene: &FlatScene, transforms: &[Mat4]) {
+        if transforms.len() != scene.instances.len() || !scene.has_top_level() {
+            return;
+        }
+        let boxes: Vec<[Vec3; 2]> = scene
+            .instances
+            .iter()
+            .zip(transforms)
+            .map(|(instance, &transform)| {
+                let root = &scene.nodes[scene.meshes[instance.mesh as usize].root as usize];
+                levels::transformed_box(transform, [root.min, root.max])
+            })
+            .collect();
+        let nodes = levels::top_level(&boxes, self.top_level);
+        let offset = u64::from(self.top_level) * size_of::<BvhNode>() as u64;
+        gpu.queue.write_buffer(&self.nodes, offset, bytemuck::cast_slice(&nodes));
+        self.instances.write(gpu, 0, &instance_records(scene, transforms, &self.transforms));
+        self.transforms = transforms.to_vec();
+    }
+
+    /// Index in `nodes` of the root of everything.
+    pub fn top_level(&self) -> u32 {
+        self.top_level
+    }
+
     /// The punctual lights as they are uploaded now, in the order of the scene.
     pub fn punctual_lights(&self) -> &[Light] {
         &self.punctual
@@ -124,9 +173,12 @@ impl GpuScene {
     pub fn share<'a>(&'a self, recorder: &mut Recorder<'a>) {
         recorder.features = self.features;
         recorder.share("nodes", &self.nodes);
-        recorder.share("triangles", &self.triangles);
-        recorder.share("materials", &self.materials);
+        recorder.share("triangles", &self.triangles[0]);
+        recorder.share("triangles_rest", &self.triangles[1]);
         recorder.share("lights", &self.lights);
+        recorder.share("attributes", &self.attributes.view);
+        recorder.share("materials", &self.materials.view);
+        recorder.share("instances", &self.instances.view);
         recorder.share("atlas", &self.atlas);
         recorder.share("environment_radiance", &self.environment_radiance);
         recorder.share("environment_alias", &self.environment_alias);
@@ -143,7 +195,22 @@ fn features(scene: &FlatScene) -> SceneFeatures {
         alpha_masks: scene.triangles.iter().any(|t| t.flags & TRIANGLE_ALPHA_MASK != 0),
         environment: environment_light(scene) != NONE,
         punctual_lights: scene.lights.iter().any(|l| l.kind != LIGHT_TRIANGLE && l.kind != LIGHT_ENVIRONMENT),
+        instances: scene.has_top_level(),
+        many_triangles: scene.triangles.len() > FIRST_TRIANGLES,
     }
+}
+
+fn instance_records(scene: &FlatScene, transforms: &[Mat4], previous: &[Mat4]) -> Vec<Instance> {
+    let record = |((instance, &transform), &previous): ((&FlatInstance, &Mat4), &Mat4)| Instance {
+        to_object: if levels::is_invertible(transform) { levels::rows(transform.inverse()) } else { [Vec4::ZERO; 3] },
+        to_world: levels::rows(transform),
+        previous_to_world: levels::rows(previous),
+        root: scene.meshes[instance.mesh as usize].root,
+        first_light: instance.first_light,
+        previous_triangles: 0,
+        padding: 0,
+    };
+    scene.instances.iter().zip(transforms).zip(previous).map(record).collect()
 }
 
 /// Index of the environment among the lights, or `NONE`.

@@ -411,7 +411,7 @@ impl Renderer {
             scene_radius: 0.5 * (high - low).length(),
             history: self.previous_camera.is_some().into(),
             pixel_filter: self.render_params.pixel_filter,
-            padding: 0,
+            top_level: self.gpu_scene.top_level(),
         }
     }
 

@@ -72,7 +72,8 @@ fn reuse_pixel(pixel: vec2u) {
         return;
     }
     let uv = bitcast<vec2f>(seen.zw);
-    let previous = load_surface(seen.y, uv, direction_to_camera(frame.previous_camera, triangle_point(seen.y, uv)));
+    let previous = load_surface(seen.x, seen.y, uv,
+        direction_to_camera(frame.previous_camera, triangle_point(seen.x, seen.y, uv)));
     if !is_same_surface(surface, previous) {
         keep(pixel);
         return;

@@ -14,7 +14,7 @@ const _: () = assert!(cfg!(target_endian = "little"), "arrays are copied as they
 
 const MAGIC: [u8; 4] = *b"RSTR";
 /// Of the layout: to be raised by each change to the header, the arrays or their elements.
-pub(super) const VERSION: u32 = 1;
+pub(super) const VERSION: u32 = 2;
 const PREFIX: usize = 16;
 const ALIGNMENT: usize = 16;
 
@@ -39,6 +39,9 @@ struct Header {
 struct Sections {
     nodes: usize,
     triangles: usize,
+    attributes: usize,
+    meshes: usize,
+    instances: usize,
     materials: usize,
     lights: usize,
     atlas_texels: usize,
@@ -81,6 +84,9 @@ impl FlatScene {
         };
         section(bytemuck::cast_slice(&self.nodes));
         section(bytemuck::cast_slice(&self.triangles));
+        section(bytemuck::cast_slice(&self.attributes));
+        section(bytemuck::cast_slice(&self.meshes));
+        section(bytemuck::cast_slice(&self.instances));
         section(bytemuck::cast_slice(&self.materials));
         section(bytemuck::cast_slice(&self.lights));
         section(&self.atlas.texels);
@@ -112,11 +118,24 @@ impl FlatScene {
         }
         let header = reader.take(u32::from_le_bytes(word(2)) as usize, "header")?;
         let header: Header = serde_json::from_slice(header).map_err(|e| bad("header", e.to_string()))?;
-        let Sections { nodes, triangles, materials, lights, atlas_texels, environment_texels } = header.sections;
+        let Sections {
+            nodes,
+            triangles,
+            attributes,
+            meshes,
+            instances,
+            materials,
+            lights,
+            atlas_texels,
+            environment_texels,
+        } = header.sections;
         let scene = FlatScene {
             name: header.name,
             nodes: reader.array(nodes, "nodes")?,
             triangles: reader.array(triangles, "triangles")?,
+            attributes: reader.array(attributes, "attributes")?,
+            meshes: reader.array(meshes, "meshes")?,
+            instances: reader.array(instances, "instances")?,
             materials: reader.array(materials, "materials")?,
             lights: reader.array(lights, "lights")?,
             first_punctual: header.first_punctual,
@@ -214,6 +233,9 @@ fn header_of(scene: &FlatScene) -> Header {
         sections: Sections {
             nodes: scene.nodes.len(),
             triangles: scene.triangles.len(),
+            attributes: scene.attributes.len(),
+            meshes: scene.meshes.len(),
+            instances: scene.instances.len(),
             materials: scene.materials.len(),
             lights: scene.lights.len(),
             atlas_texels: scene.atlas.texels.len(),
