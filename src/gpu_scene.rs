@@ -5,6 +5,7 @@ use crate::gpu::Gpu;
 use crate::gpu::data_texture::DataTexture;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
+use crate::pace::{Pace, SLICE_BYTES};
 use crate::scene::FlatScene;
 use crate::scene::flat::{FlatInstance, levels};
 use crate::scene::gpu_types::{BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK};
@@ -42,7 +43,16 @@ impl GpuScene {
     ///
     /// # Errors
     /// `LIMIT`, with numbers, where the device is too small for it.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn new(gpu: &Gpu, scene: &FlatScene) -> Result<Self> {
+        pollster::block_on(Self::upload(gpu, scene, &mut Pace::unbroken()))
+    }
+
+    /// Uploads a scene, in slices.
+    ///
+    /// # Errors
+    /// As [`GpuScene::new`].
+    pub async fn upload(gpu: &Gpu, scene: &FlatScene, pace: &mut Pace) -> Result<Self> {
         let limits = gpu.device.limits();
         let texture_limit = |what: &str, wanted: u32, had: u32, unit: &'static str| {
             if wanted > had {
@@ -62,7 +72,9 @@ impl GpuScene {
             [scene.atlas.size, scene.atlas.size, scene.atlas.layers],
             wgpu::TextureFormat::Rgba8Unorm,
             &scene.atlas.texels,
-        );
+            pace,
+        )
+        .await;
         let black = ([1, 1, 1], vec![[0f32; 4]], vec![[0u32; 4]]);
         let (size, radiance, alias) = match &scene.environment {
             Some(e) => ([e.width, e.height, 1], &e.radiance, &e.alias),
@@ -75,12 +87,17 @@ impl GpuScene {
         let punctual: Vec<Light> =
             scene.lights.iter().skip(first).filter(|l| l.kind != LIGHT_ENVIRONMENT).copied().collect();
         Ok(GpuScene {
-            nodes: gpu.storage_of("nodes", &scene.nodes)?,
+            nodes: gpu.storage_in_slices("nodes", &scene.nodes, pace).await?,
             triangles: [
-                gpu.storage_of("triangles", first_triangles)?,
-                gpu.storage_of("the triangles after the first 2796202", if rest.is_empty() { &point } else { rest })?,
+                gpu.storage_in_slices("triangles", first_triangles, pace).await?,
+                gpu.storage_in_slices(
+                    "the triangles after the first 2796202",
+                    if rest.is_empty() { &point } else { rest },
+                    pace,
+                )
+                .await?,
             ],
-            attributes: DataTexture::new(gpu, "attributes", &scene.attributes)?,
+            attributes: DataTexture::in_slices(gpu, "attributes", &scene.attributes, pace).await?,
             materials: DataTexture::new(gpu, "materials", &scene.materials)?,
             instances: DataTexture::new(gpu, "instances", &instance_records(scene, &transforms, &transforms))?,
             transforms,
@@ -88,7 +105,7 @@ impl GpuScene {
             lights: if scene.lights.is_empty() {
                 gpu.storage("lights", std::mem::size_of::<Light>() as u64)?
             } else {
-                gpu.storage_of("lights", &scene.lights)?
+                gpu.storage_in_slices("lights", &scene.lights, pace).await?
             },
             atlas: atlas.create_view(&wgpu::TextureViewDescriptor {
                 dimension: Some(wgpu::TextureViewDimension::D2Array),
@@ -100,7 +117,9 @@ impl GpuScene {
                 size,
                 wgpu::TextureFormat::Rgba32Float,
                 bytemuck::cast_slice(radiance),
+                pace,
             )
+            .await
             .create_view(&Default::default()),
             environment_alias: upload(
                 gpu,
@@ -108,7 +127,9 @@ impl GpuScene {
                 size,
                 wgpu::TextureFormat::Rgba32Uint,
                 bytemuck::cast_slice(alias),
+                pace,
             )
+            .await
             .create_view(&Default::default()),
             rest_positions: punctual.iter().map(|l| l.position).collect(),
             punctual,
@@ -221,7 +242,14 @@ pub fn environment_light(scene: &FlatScene) -> u32 {
     }
 }
 
-fn upload(gpu: &Gpu, label: &str, size: [u32; 3], format: wgpu::TextureFormat, bytes: &[u8]) -> wgpu::Texture {
+async fn upload(
+    gpu: &Gpu,
+    label: &str,
+    size: [u32; 3],
+    format: wgpu::TextureFormat,
+    bytes: &[u8],
+    pace: &mut Pace,
+) -> wgpu::Texture {
     let [width, height, layers] = size;
     let extent = wgpu::Extent3d { width, height, depth_or_array_layers: layers };
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -235,20 +263,23 @@ fn upload(gpu: &Gpu, label: &str, size: [u32; 3], format: wgpu::TextureFormat, b
         view_formats: &[],
     });
     let row = width * format.block_copy_size(None).unwrap_or(4);
-    // Layer by layer, so that no staging copy is larger than a layer.
-    let layer_bytes = row as usize * height as usize;
-    for (layer, data) in bytes.chunks_exact(layer_bytes).enumerate() {
-        gpu.queue.write_texture(
-            wgpu::TexelCopyTextureInfo {
-                texture: &texture,
-                mip_level: 0,
-                origin: wgpu::Origin3d { x: 0, y: 0, z: layer as u32 },
-                aspect: wgpu::TextureAspect::All,
-            },
-            data,
-            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: Some(height) },
-            wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        );
+    // A few rows of a layer at once, so that no staging copy is large.
+    let rows = (SLICE_BYTES as u32 / row).clamp(1, height);
+    for (layer, data) in bytes.chunks_exact(row as usize * height as usize).enumerate() {
+        for (part, y) in data.chunks(row as usize * rows as usize).zip((0..).step_by(rows as usize)) {
+            gpu.queue.write_texture(
+                wgpu::TexelCopyTextureInfo {
+                    texture: &texture,
+                    mip_level: 0,
+                    origin: wgpu::Origin3d { x: 0, y, z: layer as u32 },
+                    aspect: wgpu::TextureAspect::All,
+                },
+                part,
+                wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: Some(rows) },
+                wgpu::Extent3d { width, height: part.len() as u32 / row, depth_or_array_layers: 1 },
+            );
+            pace.breathe().await;
+        }
     }
     texture
 }

@@ -3,13 +3,13 @@ import { findAdapter } from './adapter.js';
 import type { Camera, Description, SceneReport, Stats, TechniqueInfo } from './api.js';
 import { OrbitCamera } from './camera.js';
 import { Controls } from './controls.js';
-import { acceptDrops, readFiles } from './files.js';
+import { acceptDrops, sceneOf } from './files.js';
 import { SceneLoader } from './loader.js';
 import { toFailure } from './messages.js';
 import { byId, clearError, showError, showProgress, showStatus, showWarnings } from './notices.js';
 import { type Group, fillMenu, isDefault, showPanel } from './panel.js';
 import init, { Viewer, describe } from './pkg/restir.js';
-import type { SceneSource } from './protocol.js';
+import type { Choice, Contents, Loaded, SceneSource } from './protocol.js';
 import { RenderLoop } from './render-loop.js';
 import { Resolution } from './resolution.js';
 import { readQuery, writeQuery } from './url-state.js';
@@ -44,6 +44,8 @@ class App {
   private viewer: Viewer | undefined;
   /** The scene as the worker made it: a lost device is rebuilt from it. */
   private flat: Uint8Array | undefined;
+  /** Where that came from. */
+  private source: SceneSource | undefined;
   private cameras: Camera[] = [];
   private adapter = '';
   private rendered: [number, number] = [0, 0];
@@ -84,40 +86,55 @@ class App {
 
   // Scenes
 
-  private flatten(source: SceneSource): Promise<Uint8Array> {
+  private flatten(source: SceneSource): Promise<Loaded> {
     return this.loader.load(this.compiled, { source, lights: this.state.lights, seed: this.state.seed }, showProgress);
   }
 
-  /** Shows a scene, or says why not and keeps the former one. */
-  private async open(source: SceneSource, flat = this.flatten(source)): Promise<void> {
+  /** Shows a scene, or says why not and keeps the former one. With `keepView` the camera stays where it is. */
+  private async open(source: SceneSource, loading = this.flatten(source), keepView = false): Promise<void> {
     try {
-      const bytes = await flat;
-      showProgress(1, 'Starting the renderer');
-      if (this.viewer) await this.loop.change((viewer) => this.replaceScene(viewer, bytes));
-      else await this.createViewer(bytes);
-      this.flat = bytes;
+      const { flat, contents } = await loading;
+      showProgress(1, 'Starting the renderer', { cancellable: false });
+      if (this.viewer) await this.loop.change((viewer) => this.replaceScene(viewer, flat, keepView));
+      else await this.createViewer(flat);
+      this.flat = flat;
+      this.source = source;
       this.state.scene = source.kind === 'builtin' ? source.name : undefined;
       clearError();
+      this.showContents(source, contents);
       this.writeUrl();
     } catch (error) {
-      showError(error);
+      // A load that made way for another leaves the bar to that.
+      if (toFailure(error).code === 'CANCELLED' && this.loader.busy) return;
+      if (toFailure(error).code !== 'CANCELLED') showError(error);
     }
-    this.showSceneMenu(source);
+    this.showSceneMenu(this.source ?? source);
     showProgress(undefined);
   }
 
   private async openFiles(files: File[]): Promise<void> {
     try {
-      await this.open(await readFiles(files));
+      await this.open(sceneOf(files));
     } catch (error) {
       showError(error);
     }
   }
 
-  private replaceScene(viewer: Viewer, flat: Uint8Array): void {
-    viewer.load(flat);
-    this.state.camera = '0';
-    this.state.pose = undefined;
+  /** Loads the same file again with another choice. */
+  private async choose(choice: Choice): Promise<void> {
+    const { source } = this;
+    if (source?.kind !== 'file') return;
+    const chosen = { ...source, choice: { ...source.choice, ...choice } };
+    await this.open(chosen, this.flatten(chosen), choice.scene === undefined);
+  }
+
+  private async replaceScene(viewer: Viewer, flat: Uint8Array, keepView: boolean): Promise<void> {
+    await viewer.load(flat);
+    if (keepView) this.state.pose = this.orbit.toCamera();
+    else {
+      this.state.camera = '0';
+      this.state.pose = undefined;
+    }
     this.sceneOpened(viewer);
   }
 
@@ -251,7 +268,19 @@ class App {
     fillMenu(menu('scene'), entries, chosen);
   }
 
+  /** Menus for what can be chosen in the file shown; hidden where there is no choice. */
+  private showContents(source: SceneSource, { scenes, scene, variants }: Contents = { scenes: [], scene: 0, variants: [] }): void {
+    const choice = source.kind === 'file' ? source.choice : {};
+    byId('file-scene-row', HTMLElement).hidden = scenes.length < 2;
+    byId('variant-row', HTMLElement).hidden = variants.length === 0;
+    fillMenu(menu('file-scene'), scenes.map((name, index) => [String(index), name]), String(choice.scene ?? scene));
+    fillMenu(menu('variant'), [['', 'default'], ...variants.map((name): [string, string] => [name, name])], choice.variant ?? '');
+  }
+
   private listen(): void {
+    button('cancel').addEventListener('click', () => this.loader.cancel());
+    menu('file-scene').addEventListener('change', () => void this.choose({ scene: Number(menu('file-scene').value) }));
+    menu('variant').addEventListener('change', () => void this.choose({ variant: menu('variant').value || undefined }));
     menu('scene').addEventListener('change', () => void this.open({ kind: 'builtin', name: menu('scene').value }));
     menu('technique').addEventListener('change', () => this.chooseTechnique(menu('technique').value));
     menu('view').addEventListener('change', () => {

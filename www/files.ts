@@ -1,18 +1,14 @@
 // Files that a person picked or dropped, to a scene to load.
 import type { SceneSource } from './protocol.js';
 
-/** Reads `files`, of which one is a .glb or .gltf. Rejects with NOT_A_SCENE or IO. */
-export async function readFiles(files: readonly File[]): Promise<SceneSource> {
-  const main = files.find(({ name }) => /\.(glb|gltf)$/i.test(name));
-  if (!main) throw { code: 'NOT_A_SCENE', message: `${files.map(({ name }) => name).join(', ') || 'Nothing'} is neither .glb nor .gltf.` };
-  const read = async (file: File) => {
-    try {
-      return { name: file.name, bytes: new Uint8Array(await file.arrayBuffer()) };
-    } catch (error) {
-      throw { code: 'IO', message: `${file.name}: ${(error as Error).message}` };
-    }
-  };
-  return { kind: 'file', name: main.name, files: await Promise.all(files.map(read)) };
+/** The scene among `files`: a .glb, .gltf, .obj or .restir. Throws NOT_A_SCENE. The worker reads them. */
+export function sceneOf(files: readonly File[]): SceneSource {
+  const main = files.find(({ name }) => /\.(glb|gltf|obj|restir)$/i.test(name));
+  if (!main) {
+    const names = files.map(({ name }) => name).join(', ') || 'Nothing';
+    throw { code: 'NOT_A_SCENE', message: `${names} is neither .glb, .gltf, .obj nor .restir.` };
+  }
+  return { kind: 'file', name: main.name, files: [...files], choice: {} };
 }
 
 /** Calls `dropped` with what is dropped anywhere on the page; `hint` is shown while something hovers. */

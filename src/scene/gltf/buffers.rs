@@ -37,7 +37,8 @@ impl<'a> Buffers<'a> {
             let uri = buffer.uri.as_deref();
             let extension = buffer.extensions.as_ref().and_then(|extensions| meshopt(&extensions.others));
             let is_fallback = extension.is_some_and(|extension| extension["fallback"] == true);
-            if is_fallback || (uri.is_none() && index > 0 && MESHOPT.iter().any(|name| document.uses(name))) {
+            let has_no_bytes = uri.is_none() && (index > 0 || document.binary.is_none());
+            if is_fallback || (has_no_bytes && MESHOPT.iter().any(|name| document.uses(name))) {
                 loaded.buffers.push(None);
                 continue;
             }
