@@ -589,6 +589,8 @@ fn glass_and_cutouts_of_mtl() {
         (&leaf["alphaMode"], &leaf["pbrMetallicRoughness"]["baseColorFactor"][3]),
         (&json!("BLEND"), &json!(0.25))
     );
+    let grey = converted("newmtl glass\nKd 0.5\nKe\n");
+    assert_eq!(grey["pbrMetallicRoughness"]["baseColorFactor"], json!([0.5, 0.5, 0.5, 1.0]));
     let odd = converted("newmtl glass\nKd nan inf -1\nNs nan\nKe nan 0 0\nd nan\n");
     assert_eq!(odd["pbrMetallicRoughness"]["baseColorFactor"], json!([0.0, 0.0, 0.0, 1.0]));
 }
@@ -606,13 +608,16 @@ fn odd_and_broken_obj() {
         (format!("{corners}f 1 2 4\n"), "out of bounds"),
         (format!("{corners}f 0 1 2\n"), "OBJ"),
         (format!("{corners}f 1 2 -9\n"), "OBJ"),
-        (format!("{corners}f 1/7 2/7 3/7\n"), "out of bounds"),
-        (format!("{corners}f 1//7 2//7 3//7\n"), "out of bounds"),
+        (format!("{corners}vt 0 0\nf 1/7 2/7 3/7\n"), "out of bounds"),
+        (format!("{corners}vn 0 0 1\nf 1//7 2//7 3//7\n"), "out of bounds"),
+        (format!("{corners}f 1 2 99999999999\n"), "line 4: 99999999999"),
+        (format!("{corners}f 1 2 -9223372036854775808\n"), "line 4"),
         (format!("{corners}f a b c\n"), "face"),
         ("v 0 0 zero\n".to_owned(), "position"),
         ("v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_owned(), "not finite"),
         ("v 0 0 1e99\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_owned(), "not finite"),
     ] {
+        assert!(load(&text, None).is_err(), "{text}");
         assert_refused(load(&text, None), "BAD_FILE", &["test.obj", what]);
     }
     // Binary data under the name.

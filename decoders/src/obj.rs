@@ -30,12 +30,14 @@ pub fn to_glb(bytes: &[u8], resolve: Resolve) -> Result<Converted> {
     let resolve = RefCell::new(resolve);
     let warnings = RefCell::new(Vec::new());
     // Comments and names may be in any encoding; numbers are not.
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let text = String::from_utf8_lossy(bytes);
+    check_indices(&text)?;
     let library = |path: &Path| {
         let name = path.to_string_lossy().replace('\\', "/");
         let bytes = (resolve.borrow_mut())(&name);
-        let loaded =
-            bytes.ok_or(LoadError::OpenFileFailed).and_then(|mtl| tobj::load_mtl_buf(&mut Cursor::new(text(&mtl))));
+        let loaded = bytes
+            .ok_or(LoadError::OpenFileFailed)
+            .and_then(|mtl| tobj::load_mtl_buf(&mut Cursor::new(whole_colours(&mtl))));
         if let Err(error) = &loaded {
             let why = if *error == LoadError::OpenFileFailed { "it was not found".into() } else { error.to_string() };
             warnings.borrow_mut().push(format!("material library {}: {why}; its materials are grey", tidy(&name)));
@@ -43,7 +45,7 @@ pub fn to_glb(bytes: &[u8], resolve: Resolve) -> Result<Converted> {
         loaded
     };
     let options = LoadOptions { triangulate: true, single_index: true, ignore_points: true, ignore_lines: true };
-    let loaded = tobj::load_obj_buf(&mut Cursor::new(text(bytes)), &options, library);
+    let loaded = tobj::load_obj_buf(&mut Cursor::new(text.as_bytes()), &options, library);
     let (models, materials) = loaded.map_err(|error| broken(format!("OBJ: {error}")))?;
 
     let mut writer = Writer::default();
@@ -80,6 +82,40 @@ pub fn to_glb(bytes: &[u8], resolve: Resolve) -> Result<Converted> {
         root["buffers"] = json!([{"byteLength": writer.binary.len()}]);
     }
     Ok(Converted { glb: glb(root.to_string().into_bytes(), &writer.binary)?, warnings: warnings.into_inner() })
+}
+
+/// Refuses indices that do not fit in 32 bits: `tobj` multiplies them before it compares them.
+fn check_indices(text: &str) -> Result<()> {
+    for (line, number) in text.lines().zip(1..) {
+        let mut words = line.split_whitespace();
+        if !matches!(words.next(), Some("f" | "l" | "p")) {
+            continue;
+        }
+        let absurd =
+            |index: &str| index.parse::<i64>().map_or(index.len() > 18, |index| index.abs() > i64::from(i32::MAX));
+        if let Some(index) = words.flat_map(|corner| corner.split('/')).find(|index| absurd(index)) {
+            return Err(broken(format!("OBJ: line {number}: {} is no index", tidy(index))));
+        }
+    }
+    Ok(())
+}
+
+/// Material text in which every colour has three numbers, for which `tobj` waits: those left out are as the last one
+/// (MTL specification: "if only r is specified, then g and b are assumed to be equal to r").
+fn whole_colours(mtl: &[u8]) -> String {
+    let mut out = String::with_capacity(mtl.len());
+    for line in String::from_utf8_lossy(mtl).lines() {
+        let words: Vec<&str> = line.split_whitespace().take(4).collect();
+        match (words.first(), words.last()) {
+            (Some(&("Ka" | "Kd" | "Ks" | "Ke")), Some(last)) if words.len() < 4 => {
+                out.push_str(&words.join(" "));
+                (words.len()..4).for_each(|_| out.extend([" ", last]));
+            }
+            _ => out.push_str(line),
+        }
+        out.push('\n');
+    }
+    out
 }
 
 /// What converted materials may use.
