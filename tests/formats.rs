@@ -589,7 +589,7 @@ fn glass_and_cutouts_of_mtl() {
         (&leaf["alphaMode"], &leaf["pbrMetallicRoughness"]["baseColorFactor"][3]),
         (&json!("BLEND"), &json!(0.25))
     );
-    let grey = converted("newmtl glass\nKd 0.5\nKe\n");
+    let grey = converted("newmtl glass\nKd 0.5\n");
     assert_eq!(grey["pbrMetallicRoughness"]["baseColorFactor"], json!([0.5, 0.5, 0.5, 1.0]));
     let odd = converted("newmtl glass\nKd nan inf -1\nNs nan\nKe nan 0 0\nd nan\n");
     assert_eq!(odd["pbrMetallicRoughness"]["baseColorFactor"], json!([0.0, 0.0, 0.0, 1.0]));
