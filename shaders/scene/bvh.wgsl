@@ -3,6 +3,7 @@
 // may be inlined.
 #include "scene/data.wgsl"
 #include "scene/texture.wgsl"
+#include "lib/shapes.wgsl"
 
 // The builders guarantee that no ray needs more (src/scene/bvh/wide.rs).
 const BVH_STACK = 96u;
@@ -15,6 +16,7 @@ const NO_CHILD = 3.4e38; // farther than anything
 const TRIANGLE_DOUBLE_SIDED = 1u;
 const TRIANGLE_ALPHA_MASK = 2u;
 const TRIANGLE_TANGENTS = 4u;
+const SHAPE_SHIFT = 28u;
 const BITANGENT_SHIFT = 16u;
 
 struct Hit {
@@ -43,12 +45,48 @@ fn triangle_color(triangle: u32, uv: vec2f) -> vec4f {
     return (1.0 - uv.x - uv.y) * unpack_color(colors.x) + uv.x * unpack_color(colors.y) + uv.y * unpack_color(colors.z);
 }
 
-// Whether a masked triangle exists at a point of it.
+// Whether a masked triangle exists at a point of it. Read at level 0: a mean of alpha against a cutoff is not the part that
+// exists, and a surface must be there, or not, for every ray alike.
 fn passes_alpha(triangle: u32, uv: vec2f) -> bool {
     let material = load_material(load_triangle(triangle).material);
     let alpha = material.base_color.a * triangle_color(triangle, uv).a
-        * texture_read(material.base_color_texture, triangle_uvs(triangle, uv)).a;
+        * texture_read(material.base_color_texture, texture_finest(triangle_uvs(triangle, uv))).a;
     return alpha >= material.alpha_cutoff;
+}
+
+fn shape_of(flags: u32) -> u32 {
+    return (flags >> SHAPE_SHIFT) & 3u;
+}
+
+fn is_sphere(flags: u32) -> bool {
+    return scene_has_shapes && shape_of(flags) == SHAPE_SPHERE;
+}
+
+// A primitive that is no triangle. The plane of a flat one as by Möller and Trumbore 1997; it has no neighbours to be
+// watertight with.
+fn intersect_shape(index: u32, instance: u32, triangle: Triangle, origin: vec3f, direction: vec3f,
+    hit: ptr<function, Hit>) {
+    let e1 = triangle.p1 - triangle.p0;
+    let e2 = triangle.p2 - triangle.p0;
+    let s = origin - triangle.p0;
+    if is_sphere(triangle.flags) {
+        let t = enter_sphere(s, direction, length(e1));
+        if t > 0.0 && t < (*hit).t {
+            *hit = Hit(t, index, sphere_uv(normalize(s + t * direction)), instance);
+        }
+        return;
+    }
+    let p = cross(direction, e2);
+    let determinant = dot(e1, p);
+    if determinant <= 0.0 && (determinant == 0.0 || (triangle.flags & TRIANGLE_DOUBLE_SIDED) == 0u) {
+        return;
+    }
+    let q = cross(s, e1);
+    let uv = vec2f(dot(s, p), dot(direction, q)) / determinant;
+    let t = dot(e2, q) / determinant;
+    if t > 0.0 && t < (*hit).t && shape_contains(shape_of(triangle.flags), uv) {
+        *hit = Hit(t, index, uv, instance);
+    }
 }
 
 // The sign of the volume that a ray from the origin spans with the edge from a to b (its Plücker product). The same edge
@@ -69,6 +107,10 @@ fn intersect_triangle(index: u32, instance: u32, origin: vec3f, direction: vec3f
     let triangle = load_triangle(index);
     let e1 = triangle.p1 - triangle.p0;
     let e2 = triangle.p2 - triangle.p0;
+    if scene_has_shapes && shape_of(triangle.flags) != SHAPE_TRIANGLE {
+        intersect_shape(index, instance, triangle, origin, direction, hit);
+        return;
+    }
     let p0 = triangle.p0 - origin;
     let p1 = triangle.p1 - origin;
     let p2 = triangle.p2 - origin;

@@ -14,18 +14,21 @@ const ENVIRONMENT_SAMPLE = 5u;
 const CAMERA = 6u;
 const SHADING_NORMAL = 8u;
 const SHADOW_RAY = 9u;
+const FOOTPRINT = 20u;
+const PYRAMID_SAMPLE = 10u;
 
 fn evaluate(operation: u32, input: TestInput) -> TestOutput {
     let a = float(input.a);
     let b = float(input.b);
     switch operation {
         case TEXTURE_READ: {
-            return TestOutput(bits(texture_read(load_material(input.b.x).base_color_texture, a)), vec4u(0u));
+            return TestOutput(bits(texture_read(load_material(input.b.x).base_color_texture,
+                TextureCoordinates(a, b.yz))), vec4u(0u));
         }
         case LIGHT_SAMPLE: {
             var rng = rng_new(input.a.xy, 0u, input.a.z, 0u);
-            let sample = light_sample(&rng);
-            return TestOutput(vec4u(sample.light, sample.point, bitcast<u32>(light_sample_pdf(sample)),
+            let sample = light_sample(b.xyz, &rng);
+            return TestOutput(vec4u(sample.light, sample.point, bitcast<u32>(light_sample_pdf(b.xyz, sample)),
                 bitcast<u32>(lights[sample.light].pmf)), vec4u(0u));
         }
         case LIGHT_CONTRIBUTION: {
@@ -39,17 +42,22 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
             let triangle = lights[sample.light].triangle;
             let instance = lights[sample.light].instance;
             let distance = length(triangle_point(instance, triangle, light_sample_barycentrics(sample)) - a.xyz);
-            return TestOutput(bits(vec4f(light_sample_pdf(sample) * light.solid_angle_jacobian,
-                light_hit_pdf(sample.light, instance, triangle, light.direction, distance), 0.0, 0.0)), vec4u(0u));
+            return TestOutput(bits(vec4f(light_sample_pdf(a.xyz, sample) * light.solid_angle_jacobian,
+                light_hit_pdf(sample.light, instance, triangle, a.xyz, light.direction, distance), 0.0, 0.0)), vec4u(0u));
         }
         case ENVIRONMENT: {
             return TestOutput(bits_3(environment_evaluate(a.xyz), environment_pdf(a.xyz)),
                 bits(vec4f(environment_uv(a.xyz), 0.0, 0.0)));
         }
         case ENVIRONMENT_SAMPLE: {
-            let point = environment_sample(input.b.xy, a.xyz);
+            let point = environment_cell(environment_texel_by_alias(input.b.xy, a.x), a.yz);
             return TestOutput(bits_3(environment_direction(unpack_point(point)), environment_point_pdf(point)),
                 vec4u(point, 0u, 0u, 0u));
+        }
+        case PYRAMID_SAMPLE: {
+            var rng = rng_new(input.a.xy, 0u, input.a.z, 0u);
+            let texel = environment_texel_by_pyramid(&rng);
+            return TestOutput(vec4u(texel, bitcast<u32>(environment_texel_pdf(texel)), 0u), vec4u(0u));
         }
         // Out along the ray of a film point, and back to the film.
         case CAMERA: {
@@ -59,7 +67,7 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
         }
         // At the point b.xy of the triangle input.a.x.
         case SHADING_NORMAL: {
-            return TestOutput(bits_3(shading_normal(input.a.x, b.xy, triangle_uvs(input.a.x, b.xy)), 0.0), vec4u(0u));
+            return TestOutput(bits_3(shading_normal(input.a.x, b.xy, texture_finest(triangle_uvs(input.a.x, b.xy))), 0.0), vec4u(0u));
         }
         // Whether a surface at a, normal b, sees the light sample c.xy, and what that sends there.
         case SHADOW_RAY: {
@@ -70,6 +78,11 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
             let light = light_contribution(LightSample(input.c.x, input.c.y), a.xyz, false);
             let is_lit = is_visible(surface, light.direction, light.distance);
             return TestOutput(bits_3(light.value, light.distance), vec4u(u32(is_lit), 0u, 0u, 0u));
+        }
+        // Of a cone a.w wide that meets the triangle b.x from a.xyz: what it covers of a texture, and how wide it goes on.
+        case FOOTPRINT: {
+            let areas = texture_coordinates(0u, input.b.x, vec2f(0.3), a.xyz, a.w).areas;
+            return TestOutput(bits(vec4f(areas, scattered_spread(0u, input.b.x, b.y, a.w, b.z), 0.0)), vec4u(0u));
         }
         default: { return TestOutput(vec4u(0u), vec4u(0u)); }
     }

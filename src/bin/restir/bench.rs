@@ -10,7 +10,7 @@ use crate::{bench_rays, progress, report};
 pub struct Args {
     #[command(subcommand)]
     what: Option<What>,
-    /// A .glb or .gltf file, or builtin:NAME (see `restir scenes`).
+    /// A .glb, .gltf, .obj or .restir file, or builtin:NAME (see `restir scenes`).
     #[arg(value_name = "SCENE", default_value = "builtin:cornell")]
     scene: String,
     #[command(flatten)]

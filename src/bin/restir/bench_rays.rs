@@ -22,9 +22,11 @@ use std::time::Instant;
 /// points within it where no light has a place.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A .glb or .gltf file, or builtin:NAME (see `restir scenes`).
+    /// A .glb, .gltf, .obj or .restir file, or builtin:NAME (see `restir scenes`).
     #[arg(value_name = "SCENE", default_value = "builtin:hall:1000000")]
     scene: String,
+    #[command(flatten)]
+    choice: scene::Choice,
     /// Picture size in pixels: how many primary rays there are.
     #[arg(long, value_name = "WxH", default_value = "1920x1080", value_parser = options::size)]
     size: UVec2,
@@ -104,9 +106,7 @@ struct SetReport {
 
 pub fn run(args: &Args) -> Result<()> {
     let listed = args.rays.as_ref().map(|path| ray_sets::read(path)).transpose()?;
-    let source = scene::load(&args.scene)?;
-    let flat = scene::flatten(&source)?;
-    drop(source);
+    let flat = scene::open(&args.scene, &args.choice, None)?;
     report::warnings(&flat.warnings);
     let camera = match (args.eye, args.target) {
         (Some(eye), Some(target)) => Camera::look_at("given", eye, target, args.fov.to_radians()),

@@ -2,14 +2,16 @@
 
 use crate::failure::Result;
 use crate::{report, scene};
-use restir::scene::flat::SceneStats;
+use restir::scene::flat::{SceneStats, TextureStats};
 
 /// Show what a scene holds: triangles, lights, bytes, the BVH, warnings.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A .glb or .gltf file, or builtin:NAME (see `restir scenes`).
+    /// A .glb, .gltf, .obj or .restir file, or builtin:NAME (see `restir scenes`).
     #[arg(value_name = "SCENE")]
     scene: String,
+    #[command(flatten)]
+    choice: scene::Choice,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -21,6 +23,9 @@ struct Info {
     #[serde(flatten)]
     stats: SceneStats,
     cameras: Vec<String>,
+    /// Of a glTF file: what --scene-index and --variant choose from.
+    scenes: Vec<String>,
+    variants: Vec<String>,
     moving_lights: usize,
     /// Lowest and highest corner in metres.
     bounds: [[f32; 3]; 2],
@@ -28,11 +33,14 @@ struct Info {
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    let flat = scene::flatten(&scene::load(&args.scene)?)?;
+    let flat = scene::open(&args.scene, &args.choice, None)?;
+    let contents = scene::contents(&args.scene)?;
     let info = Info {
         name: flat.name,
         stats: flat.stats,
         cameras: flat.cameras.into_iter().map(|camera| camera.name).collect(),
+        scenes: contents.scenes,
+        variants: contents.variants,
         moving_lights: flat.motions.len(),
         bounds: flat.bounds.map(|corner| corner.to_array()),
         warnings: flat.warnings,
@@ -46,6 +54,7 @@ pub fn run(args: &Args) -> Result<()> {
 
 fn table(info: &Info) -> String {
     let (stats, [low, high]) = (&info.stats, info.bounds);
+    let listed = |names: &[String]| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
     [
         format!("name       {}", info.name),
         format!("triangles  {} (and {} dropped without area)", stats.triangles, stats.dropped_triangles),
@@ -55,9 +64,47 @@ fn table(info: &Info) -> String {
         format!("lights     {} ({} emissive triangles)", stats.lights, stats.emissive_triangles),
         format!("moving     {} lights", info.moving_lights),
         format!("cameras    {}", info.cameras.join(", ")),
+        format!("scenes     {}", listed(&info.scenes)),
+        format!("variants   {}", listed(&info.variants)),
         format!("bounds     {low:?} to {high:?} m"),
         format!("bvh        {} nodes, depth {}, cost {:.1}", stats.bvh_nodes, stats.bvh_depth, stats.bvh_cost),
-        format!("memory     {:.1} MiB on the GPU", stats.gpu_bytes as f64 / f64::from(1 << 20)),
+        format!("memory     {:.1} MiB on the GPU", mebibytes(stats.gpu_bytes)),
     ]
+    .into_iter()
+    .chain(textures(&stats.texture_arrays))
+    .collect::<Vec<_>>()
     .join("\n")
+}
+
+/// A line for all texture arrays, and one for each.
+fn textures(arrays: &[TextureStats]) -> Vec<String> {
+    if arrays.is_empty() {
+        return Vec::new();
+    }
+    let of = |count: fn(&TextureStats) -> u64| arrays.iter().map(count).sum::<u64>();
+    let (images, bytes, used) = (of(|a| a.images), of(|a| a.bytes), of(|a| a.used_bytes));
+    let empty = |bytes: u64, used: u64| 100.0 * (bytes - used.min(bytes)) as f64 / bytes.max(1) as f64;
+    let total = format!(
+        "images     {images} in {} arrays: {:.1} MiB of that, {:.1} % of it empty",
+        arrays.len(),
+        mebibytes(bytes),
+        empty(bytes, used)
+    );
+    let each = arrays.iter().map(|a| {
+        format!(
+            "  array    {} x {} x {} layers, {} levels: {} images, {:.1} MiB, {:.1} % empty",
+            a.width,
+            a.height,
+            a.layers,
+            a.levels,
+            a.images,
+            mebibytes(a.bytes),
+            empty(a.bytes, a.used_bytes)
+        )
+    });
+    std::iter::once(total).chain(each).collect()
+}
+
+fn mebibytes(bytes: u64) -> f64 {
+    bytes as f64 / f64::from(1 << 20)
 }

@@ -3,6 +3,7 @@
 mod bench;
 mod bench_rays;
 mod compare;
+mod cook;
 mod failure;
 mod info;
 mod options;
@@ -36,6 +37,7 @@ enum Command {
     Techniques(techniques::Args),
     Scenes(scenes::Args),
     Info(info::Args),
+    Cook(cook::Args),
     Bench(bench::Args),
 }
 
@@ -46,6 +48,7 @@ fn run(command: Command) -> Result<()> {
         Command::Techniques(args) => techniques::run(&args),
         Command::Scenes(args) => scenes::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Cook(args) => cook::run(&args),
         Command::Bench(args) => bench::run(&args),
     }
 }

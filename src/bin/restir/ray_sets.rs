@@ -1,7 +1,7 @@
 //! The rays that `restir bench rays` traces: four sets made from a scene and a camera, or those of a file.
 
 use glam::{UVec2, Vec3};
-use restir::scene::gpu_types::{LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, NONE};
+use restir::scene::gpu_types::{LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, NONE};
 use restir::scene::random::Random;
 use restir::scene::{Camera, FlatScene, Projection};
 use restir::{Error, Result};
@@ -106,7 +106,7 @@ struct Targets<'a> {
 
 impl<'a> Targets<'a> {
     fn new(scene: &'a FlatScene) -> Self {
-        let has_place = |light: &&Light| ![LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT].contains(&light.kind);
+        let has_place = |light: &&Light| ![LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_SUN].contains(&light.kind);
         let lights: Vec<&Light> = scene.lights.iter().filter(has_place).collect();
         let [low, high] = scene.bounds;
         let margin = 0.15 * (high - low);
