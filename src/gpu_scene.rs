@@ -7,7 +7,7 @@ use crate::gpu::data_texture::DataTexture;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
 use crate::pace::{Pace, SLICE_BYTES};
-use crate::scene::bvh::wide;
+use crate::scene::bvh::wide::{self, Collapse};
 use crate::scene::flat::{FlatEnvironment, FlatInstance, TextureArray, levels};
 use crate::scene::gpu_types::{
     Instance, LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, MATERIAL_UNLIT, MATERIAL_VOLUME, MaterialExtensions,
@@ -94,7 +94,7 @@ impl GpuScene {
         let transforms: Vec<Mat4> = scene.instances.iter().map(|i| i.transform).collect();
         let first = scene.first_punctual as usize;
         let punctual: Vec<Light> = scene.lights.iter().skip(first).filter(|l| !is_distant(l)).copied().collect();
-        let forest = Forest::new(scene)?;
+        let forest = Forest::new(scene, pace).await?;
         let records = instance_records(scene, &forest.roots, &transforms, &transforms);
         Ok(GpuScene {
             nodes: gpu.storage_in_slices("the nodes of the BVH", &forest.nodes, pace).await?,
@@ -296,7 +296,9 @@ struct Forest {
 }
 
 impl Forest {
-    fn new(scene: &FlatScene) -> Result<Self> {
+    async fn new(scene: &FlatScene, pace: &mut Pace) -> Result<Self> {
+        /// Nodes made between two questions: a few milliseconds' worth.
+        const SLICE: usize = 1 << 13;
         let limit = |what: &str, wanted: u32, had: u32| {
             let what = format!("the stack for {what}");
             if wanted > had {
@@ -308,7 +310,11 @@ impl Forest {
         for mesh in &scene.meshes {
             let root = forest.nodes.len() as u32;
             forest.roots.push(root);
-            let tree = wide::collapse(&scene.nodes, mesh.root as usize, root, 0);
+            let mut collapse = Collapse::new(&scene.nodes, mesh.root as usize, root, 0);
+            while !collapse.go_on(SLICE) {
+                pace.breathe().await;
+            }
+            let tree = collapse.wide;
             limit("the BVH of a mesh", tree.stack, wide::MAX_STACK)?;
             forest.nodes.extend(tree.nodes);
         }

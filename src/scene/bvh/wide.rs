@@ -35,36 +35,61 @@ pub const fn capacity(binary_nodes: usize) -> usize {
 /// Collapses the binary tree below `nodes[root]`. The result will lie at index `first_node` of all wide nodes; `first_item`
 /// is added to what leaves name.
 pub fn collapse(nodes: &[BvhNode], root: usize, first_node: u32, first_item: u32) -> Wide {
-    let mut wide = Wide { nodes: vec![bytemuck::Zeroable::zeroed()], stack: 0 };
-    // (binary node, its wide one, stack entries below it)
-    let mut pending = vec![(root, 0usize, 0u32)];
-    while let Some((source, target, below)) = pending.pop() {
-        let children = open(nodes, source);
-        let mut references = [0; 4];
-        let mut boxes = [None; 4];
-        let entries = below + children.count as u32 - 1;
-        wide.stack = wide.stack.max(entries);
-        let first_inner = wide.nodes.len();
-        let mut inner = 0;
-        for (k, node) in children.list().filter_map(|i| nodes.get(i)).enumerate() {
-            boxes[k] = Some([node.min, node.max]);
-            references[k] = if node.count == 0 {
-                inner += 1;
-                first_node + (first_inner + inner - 1) as u32
-            } else {
-                LEAF | ((node.count.min(MAX_ITEMS) - 1) << COUNT_SHIFT) | (node.first + first_item)
-            };
-        }
-        wide.nodes.resize(first_inner + inner, bytemuck::Zeroable::zeroed());
-        wide.nodes[target] = encode(boxes, references);
-        // The first child last: it is walked, and so laid out, first.
-        let mut place = first_inner + inner;
-        for i in children.list().rev().filter(|&i| nodes.get(i).is_some_and(|node| node.count == 0)) {
-            place -= 1;
-            pending.push((i, place, entries));
-        }
+    let mut collapse = Collapse::new(nodes, root, first_node, first_item);
+    while !collapse.go_on(usize::MAX) {}
+    collapse.wide
+}
+
+/// A collapse that can be done in parts.
+pub struct Collapse<'a> {
+    nodes: &'a [BvhNode],
+    first_node: u32,
+    first_item: u32,
+    /// (binary node, its wide one, stack entries below it)
+    pending: Vec<(usize, usize, u32)>,
+    /// What is done so far.
+    pub wide: Wide,
+}
+
+impl<'a> Collapse<'a> {
+    /// Starts what [`collapse`] does.
+    pub fn new(nodes: &'a [BvhNode], root: usize, first_node: u32, first_item: u32) -> Self {
+        let wide = Wide { nodes: vec![bytemuck::Zeroable::zeroed()], stack: 0 };
+        Collapse { nodes, first_node, first_item, pending: vec![(root, 0, 0)], wide }
     }
-    wide
+
+    /// Makes at most `count` more nodes; whether that was all.
+    pub fn go_on(&mut self, count: usize) -> bool {
+        let Collapse { nodes, wide, pending, .. } = self;
+        for _ in 0..count {
+            let Some((source, target, below)) = pending.pop() else { return true };
+            let children = open(nodes, source);
+            let mut references = [0; 4];
+            let mut boxes = [None; 4];
+            let entries = below + children.count as u32 - 1;
+            wide.stack = wide.stack.max(entries);
+            let first_inner = wide.nodes.len();
+            let mut inner = 0;
+            for (k, node) in children.list().filter_map(|i| nodes.get(i)).enumerate() {
+                boxes[k] = Some([node.min, node.max]);
+                references[k] = if node.count == 0 {
+                    inner += 1;
+                    self.first_node + (first_inner + inner - 1) as u32
+                } else {
+                    LEAF | ((node.count.min(MAX_ITEMS) - 1) << COUNT_SHIFT) | (node.first + self.first_item)
+                };
+            }
+            wide.nodes.resize(first_inner + inner, bytemuck::Zeroable::zeroed());
+            wide.nodes[target] = encode(boxes, references);
+            // The first child last: it is walked, and so laid out, first.
+            let mut place = first_inner + inner;
+            for i in children.list().rev().filter(|&i| nodes.get(i).is_some_and(|node| node.count == 0)) {
+                place -= 1;
+                pending.push((i, place, entries));
+            }
+        }
+        pending.is_empty()
+    }
 }
 
 /// Up to four binary nodes that become the children of one wide node.
