@@ -6,7 +6,8 @@ use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
 use crate::scene::FlatScene;
 use crate::scene::gpu_types::{LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK};
-use glam::{Quat, Vec3};
+use crate::scene::rig::{Pose, Rig};
+use glam::Vec3;
 
 /// A [`FlatScene`] on the device.
 #[derive(Debug)]
@@ -21,7 +22,6 @@ pub struct GpuScene {
     /// The punctual lights as they are uploaded now, from `first_punctual` on.
     punctual: Vec<Light>,
     first_punctual: u32,
-    rest_positions: Vec<Vec3>,
     features: SceneFeatures,
 }
 
@@ -88,28 +88,23 @@ impl GpuScene {
                 bytemuck::cast_slice(alias),
             )
             .create_view(&Default::default()),
-            rest_positions: punctual.iter().map(|l| l.position).collect(),
             punctual,
             first_punctual: scene.first_punctual,
             features: features(scene),
         })
     }
 
-    /// Puts the lights that move where they are at `time` seconds, coming from where they were at `previous_time`.
-    pub fn animate(&mut self, gpu: &Gpu, scene: &FlatScene, previous_time: f32, time: f32) {
-        if scene.motions.is_empty() {
+    /// Puts the lights that move where `pose` has them, coming from where they were at `previous`.
+    pub fn animate(&mut self, gpu: &Gpu, rig: &Rig, previous: &Pose, pose: &Pose) {
+        if rig.lights.is_empty() {
             return;
         }
-        for motion in &scene.motions {
-            let index = motion.light as usize;
-            if let (Some(light), Some(rest)) = (self.punctual.get_mut(index), self.rest_positions.get(index)) {
-                let at = |time: f32| {
-                    let turn = Quat::from_axis_angle(motion.axis, motion.angular_speed * time);
-                    motion.center + turn * (*rest - motion.center)
-                };
-                light.previous_position = at(previous_time);
-                light.position = at(time);
-            }
+        for attached in &rig.lights {
+            let Some(light) = self.punctual.get_mut(attached.target as usize) else { continue };
+            let [before, now] = [previous, pose].map(|pose| pose.node(attached.node));
+            light.previous_position = before.w_axis.truncate();
+            light.position = now.w_axis.truncate();
+            light.direction = now.transform_vector3(Vec3::NEG_Z).try_normalize().unwrap_or(light.direction);
         }
         let offset = u64::from(self.first_punctual) * std::mem::size_of::<Light>() as u64;
         gpu.queue.write_buffer(&self.lights, offset, bytemuck::cast_slice(&self.punctual));

@@ -20,7 +20,7 @@ pub const COMMON_VIEWS: &[&str] = &["radiance", "albedo", "normal", "depth"];
 const FIRST_COMMON_VIEW: u32 = 1000;
 
 /// Seconds of scene time between two frames.
-const FRAME_TIME: f32 = 1.0 / 60.0;
+const FRAME_TIME: f64 = 1.0 / 60.0;
 
 /// Auxiliary pictures of the first surface each pixel sees. Zero where there is none.
 #[derive(Debug, Clone, Default)]
@@ -104,7 +104,7 @@ impl Renderer {
             previous_camera: None,
             view: 0,
             seed: 0,
-            accumulate: scene.motions.is_empty(),
+            accumulate: scene.rig.is_still(),
             frame_index: 0,
             moment: 0,
             accumulated: 0,
@@ -166,7 +166,7 @@ impl Renderer {
         let gpu_scene = GpuScene::new(&self.gpu, &scene)?;
         self.gpu.check()?;
         self.gpu_scene = gpu_scene;
-        self.accumulate = scene.motions.is_empty();
+        self.accumulate = scene.rig.is_still();
         self.scene = scene;
         self.camera = camera;
         self.reset();
@@ -373,8 +373,9 @@ impl Renderer {
         if self.frame_index > 0 && !self.accumulate {
             self.moment = self.moment.wrapping_add(1);
         }
-        let [previous, now] = [previous, self.moment].map(|moment| moment as f32 * FRAME_TIME);
-        self.gpu_scene.animate(&self.gpu, &self.scene, previous, now);
+        let [previous, now] =
+            [previous, self.moment].map(|moment| self.scene.rig.pose(0, f64::from(moment) * FRAME_TIME));
+        self.gpu_scene.animate(&self.gpu, &self.scene.rig, &previous, &now);
     }
 
     /// Brings the display buffer up to date with the film.

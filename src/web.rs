@@ -161,7 +161,7 @@ impl Viewer {
         let scene = self.renderer.scene();
         serde_json::json!({
             "name": scene.name, "stats": scene.stats, "warnings": scene.warnings,
-            "animated": !scene.motions.is_empty(),
+            "animated": !scene.rig.is_still(),
             "adapter": self.renderer.gpu().adapter_name(),
             "software": self.renderer.gpu().is_software(),
         })

@@ -1,6 +1,7 @@
 //! What the GPU tests share: one device a test binary, scenes in small pictures, and statistics.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+pub mod animated;
 pub mod gltf_writer;
 pub mod harness;
 pub mod statistics;

@@ -77,7 +77,7 @@ impl Session {
         report::warnings(&flat.warnings);
         let camera = scene::camera(&flat.cameras, options.camera.as_deref())?.clone();
         let (scene, stats, warnings) = (flat.name.clone(), flat.stats.clone(), flat.warnings.clone());
-        let moving = !flat.motions.is_empty();
+        let moving = !flat.rig.is_still();
 
         let gpu = block_on(Gpu::headless(&GpuOptions { default_limits: false }))?;
         let adapter = gpu.adapter_name();

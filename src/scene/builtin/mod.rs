@@ -4,6 +4,7 @@ mod cornell;
 mod furnace;
 mod glossy_spheres;
 mod many_lights;
+mod motion;
 mod veach_mis;
 
 use super::{Instance, Material, Mesh, Scene};
@@ -68,6 +69,12 @@ pub const ALL: &[BuiltinInfo] = &[
         doc: "Spheres from smooth to rough and from plastic to metal, under three panels and a dim sky.",
         example: "glossy-spheres",
     },
+    BuiltinInfo {
+        name: "motion",
+        title: "Everything that moves",
+        doc: "A column bent by its skin, a ball that morphs, a box, a lamp, a light and a camera that move, in a loop of 4 seconds.",
+        example: "motion",
+    },
 ];
 
 /// Makes a built-in scene; the same name gives the same scene.
@@ -87,6 +94,7 @@ pub fn make(name: &str) -> Result<Scene> {
             Err(Error::bad_value("many-lights:N", "the number of lights is missing, as in many-lights:10000"))
         }
         "glossy-spheres" => Ok(glossy_spheres::glossy_spheres()),
+        "motion" => Ok(motion::motion()),
         _ => Err(Error::Unknown {
             kind: "built-in scene",
             name: name.to_owned(),

@@ -5,7 +5,8 @@
 
 use super::{Atlas, FlatEnvironment, FlatScene, SceneStats, validate};
 use crate::error::{Error, Result};
-use crate::scene::{Camera, LightMotion, Projection};
+use crate::scene::rig::bytes as rig_bytes;
+use crate::scene::{Camera, Projection, Rig};
 use bytemuck::Pod;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -13,7 +14,7 @@ use serde::{Deserialize, Serialize};
 const _: () = assert!(cfg!(target_endian = "little"), "arrays are copied as they lie in memory");
 
 const MAGIC: [u8; 4] = *b"RSTR";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const PREFIX: usize = 16;
 const ALIGNMENT: usize = 16;
 
@@ -22,7 +23,7 @@ const ALIGNMENT: usize = 16;
 struct Header {
     name: String,
     first_punctual: u32,
-    motions: Vec<MotionRecord>,
+    rig: rig_bytes::Header,
     cameras: Vec<CameraRecord>,
     bounds: [[f32; 3]; 2],
     stats: SceneStats,
@@ -42,14 +43,6 @@ struct Sections {
     lights: usize,
     atlas_texels: usize,
     environment_texels: usize,
-}
-
-#[derive(Serialize, Deserialize)]
-struct MotionRecord {
-    light: u32,
-    center: [f32; 3],
-    axis: [f32; 3],
-    angular_speed: f32,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -87,6 +80,7 @@ impl FlatScene {
             section(bytemuck::cast_slice(&environment.radiance));
             section(bytemuck::cast_slice(&environment.alias));
         }
+        self.rig.arrays().into_iter().for_each(section);
         out
     }
 
@@ -119,7 +113,6 @@ impl FlatScene {
             materials: reader.array(materials, "materials")?,
             lights: reader.array(lights, "lights")?,
             first_punctual: header.first_punctual,
-            motions: header.motions.into_iter().map(MotionRecord::into_motion).collect(),
             atlas: Atlas {
                 size: header.atlas_size,
                 layers: header.atlas_layers,
@@ -134,6 +127,7 @@ impl FlatScene {
                 }),
                 None => None,
             },
+            rig: Rig::from_arrays(header.rig, &mut reader)?,
             cameras: header.cameras.into_iter().map(CameraRecord::into_camera).collect(),
             bounds: header.bounds.map(Vec3::from_array),
             stats: header.stats,
@@ -178,13 +172,13 @@ impl<'a> Reader<'a> {
     }
 }
 
+impl rig_bytes::TakeArray for Reader<'_> {
+    fn take_array<T: Pod>(&mut self, count: usize, place: &str) -> Result<Vec<T>> {
+        self.array(count, place)
+    }
+}
+
 fn header_of(scene: &FlatScene) -> Header {
-    let motions = scene.motions.iter().map(|motion| MotionRecord {
-        light: motion.light,
-        center: motion.center.to_array(),
-        axis: motion.axis.to_array(),
-        angular_speed: motion.angular_speed,
-    });
     let cameras = scene.cameras.iter().map(|camera| {
         let (orthographic, extent) = match camera.projection {
             Projection::Perspective { vertical_fov } => (false, vertical_fov),
@@ -202,7 +196,7 @@ fn header_of(scene: &FlatScene) -> Header {
     Header {
         name: scene.name.clone(),
         first_punctual: scene.first_punctual,
-        motions: motions.collect(),
+        rig: scene.rig.header(),
         cameras: cameras.collect(),
         bounds: scene.bounds.map(|corner| corner.to_array()),
         stats: scene.stats.clone(),
@@ -218,17 +212,6 @@ fn header_of(scene: &FlatScene) -> Header {
             atlas_texels: scene.atlas.texels.len(),
             environment_texels: scene.environment.as_ref().map_or(0, |e| e.radiance.len()),
         },
-    }
-}
-
-impl MotionRecord {
-    fn into_motion(self) -> LightMotion {
-        LightMotion {
-            light: self.light,
-            center: Vec3::from_array(self.center),
-            axis: Vec3::from_array(self.axis),
-            angular_speed: self.angular_speed,
-        }
     }
 }
 

@@ -11,7 +11,7 @@ mod validate;
 pub(super) use triangles::face_normal;
 
 use super::gpu_types::{BvhNode, EnvironmentTexel, Light, Material, NONE, Triangle};
-use super::{Camera, LightMotion, MAX_COORDINATE, Projection, PunctualKind, Scene, bvh};
+use super::{Camera, MAX_COORDINATE, Projection, PunctualKind, Rig, Scene, bvh, rig};
 use crate::error::{Error, Result};
 use glam::{Vec3, Vec4};
 
@@ -81,8 +81,8 @@ pub struct FlatScene {
     pub lights: Vec<Light>,
     /// Index in `lights` of the first punctual light; they follow in the order of [`Scene::lights`].
     pub first_punctual: u32,
-    /// How punctual lights move; `light` counts from `first_punctual`.
-    pub motions: Vec<LightMotion>,
+    /// What moves; its lights count from `first_punctual`, its cameras are indices in `cameras`.
+    pub rig: Rig,
     /// Textures.
     pub atlas: Atlas,
     /// Light from infinitely far away.
@@ -130,12 +130,6 @@ impl FlatScene {
             None => None,
         };
         let (lights, first_punctual) = lights::build(&mut triangles, &materials, &scene.lights, environment.is_some())?;
-        for motion in &scene.motions {
-            if motion.light as usize >= scene.lights.len() {
-                return Err(Error::bad_value("light motion", format!("there is no light {}", motion.light)));
-            }
-        }
-
         let bounds = bounds(&nodes, scene);
         let mut flat = FlatScene {
             name: scene.name.clone(),
@@ -147,12 +141,15 @@ impl FlatScene {
             materials,
             lights,
             first_punctual,
-            motions: scene.motions.clone(),
+            rig: scene.rig.clone(),
             atlas,
             environment,
             warnings: Vec::new(),
         };
-        flat.cameras = cameras(scene, &flat, &mut warnings);
+        flat.cameras = cameras(scene, &mut flat, &mut warnings);
+        let counts =
+            rig::Counts { instances: scene.instances.len(), lights: scene.lights.len(), cameras: flat.cameras.len() };
+        flat.rig.check(counts).map_err(|(place, what)| Error::bad_value(place, what))?;
         flat.warnings = warnings;
         flat.stats = SceneStats {
             triangles: triangle_count,
@@ -215,7 +212,7 @@ fn bounds(nodes: &[BvhNode], scene: &Scene) -> [Vec3; 2] {
 }
 
 /// The scene's usable cameras, or one that shows it from inside or outside.
-fn cameras(scene: &Scene, flat: &FlatScene, warnings: &mut Vec<String>) -> Vec<Camera> {
+fn cameras(scene: &Scene, flat: &mut FlatScene, warnings: &mut Vec<String>) -> Vec<Camera> {
     let usable = |camera: &&Camera| {
         let extent = match camera.projection {
             Projection::Perspective { vertical_fov } => vertical_fov,
@@ -224,7 +221,13 @@ fn cameras(scene: &Scene, flat: &FlatScene, warnings: &mut Vec<String>) -> Vec<C
         let right = camera.forward.cross(camera.up);
         camera.position.is_finite() && right.is_finite() && right.length() > 1e-6 && extent.is_finite() && extent > 0.0
     };
+    let kept: Vec<bool> = scene.cameras.iter().map(|camera| usable(&camera)).collect();
     let mut cameras: Vec<Camera> = scene.cameras.iter().filter(usable).cloned().collect();
+    // The rig follows those that are left.
+    flat.rig.cameras.retain(|attached| kept.get(attached.target as usize).copied().unwrap_or(false));
+    for attached in &mut flat.rig.cameras {
+        attached.target = kept.iter().take(attached.target as usize).filter(|kept| **kept).count() as u32;
+    }
     let unusable = scene.cameras.len() - cameras.len();
     if unusable > 0 {
         warnings.push(format!("{unusable} cameras that cannot project were left out"));

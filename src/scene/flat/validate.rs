@@ -3,6 +3,7 @@
 use super::{Atlas, FlatEnvironment, FlatScene};
 use crate::scene::bvh::MAX_DEPTH;
 use crate::scene::gpu_types::{LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, Material, NONE, TextureSlot, Triangle};
+use crate::scene::rig::Counts;
 
 /// (where, what is wrong there).
 type Fault = (String, String);
@@ -15,10 +16,6 @@ pub(super) fn validate(scene: &FlatScene) -> Result<(), Fault> {
     each("lights", &scene.lights, |i, light| check_light(scene, i, light))?;
     let punctual = (scene.lights.len() as u64).checked_sub(u64::from(scene.first_punctual));
     let punctual = punctual.ok_or_else(|| fault("first_punctual", "past the lights"))?;
-    each("motions", &scene.motions, |_, motion| {
-        let finite = motion.center.is_finite() && motion.axis.is_finite() && motion.angular_speed.is_finite();
-        must(u64::from(motion.light) < punctual && finite, "no such light, or numbers that are not finite")
-    })?;
     check_atlas(&scene.atlas).map_err(|what| fault("atlas", what))?;
     if let Some(environment) = &scene.environment {
         check_environment(environment).map_err(|what| fault("environment", what))?;
@@ -27,6 +24,9 @@ pub(super) fn validate(scene: &FlatScene) -> Result<(), Fault> {
         let finite = camera.position.is_finite() && camera.forward.is_finite() && camera.up.is_finite();
         must(finite, "numbers that are not finite")
     })?;
+    let counts =
+        Counts { instances: scene.stats.instances as usize, lights: punctual as usize, cameras: scene.cameras.len() };
+    scene.rig.check(counts)?;
     let complete = !scene.materials.is_empty() && !scene.cameras.is_empty();
     must(complete, "materials or cameras are missing").map_err(|what| fault("scene", what))?;
     must(scene.bounds.iter().all(|corner| corner.is_finite()), "not finite").map_err(|what| fault("bounds", what))

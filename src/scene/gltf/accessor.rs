@@ -12,7 +12,7 @@ pub(super) struct Shape {
     components: &'static [ComponentType],
 }
 
-use ComponentType::{F32, U8, U16, U32};
+use ComponentType::{F32, I8, I16, U8, U16, U32};
 
 /// Positions and normals.
 pub(super) const VEC3: Shape = Shape { types: &[Type::Vec3], components: &[F32] };
@@ -22,6 +22,18 @@ pub(super) const VEC4: Shape = Shape { types: &[Type::Vec4], components: &[F32] 
 pub(super) const TEXCOORD: Shape = Shape { types: &[Type::Vec2], components: &[F32, U8, U16] };
 /// Colours; integers are normalised.
 pub(super) const COLOR: Shape = Shape { types: &[Type::Vec3, Type::Vec4], components: &[F32, U8, U16] };
+/// Joints of a skin that move a vertex.
+pub(super) const JOINTS: Shape = Shape { types: &[Type::Vec4], components: &[U8, U16] };
+/// How much each of them does; integers are normalised.
+pub(super) const WEIGHTS: Shape = Shape { types: &[Type::Vec4], components: &[F32, U8, U16] };
+/// Inverse bind matrices.
+pub(super) const MATRIX: Shape = Shape { types: &[Type::Mat4], components: &[F32] };
+/// Times of keyframes.
+pub(super) const TIME: Shape = Shape { types: &[Type::Scalar], components: &[F32] };
+/// Keyframes of rotations; integers are normalised.
+pub(super) const ROTATION: Shape = Shape { types: &[Type::Vec4], components: &[F32, I8, U8, I16, U16] };
+/// Keyframes of the weights of morph targets; integers are normalised.
+pub(super) const SCALAR: Shape = Shape { types: &[Type::Scalar], components: &[F32, I8, U8, I16, U16] };
 /// Vertex indices.
 pub(super) const INDEX: Shape = Shape { types: &[Type::Scalar], components: &[U8, U16, U32] };
 
@@ -88,9 +100,21 @@ impl<'a> Elements<'a> {
         };
         std::array::from_fn(|c| match (self.component, bytes.get(c * self.component.size()..).unwrap_or_default()) {
             (U8, [a, ..]) => f32::from(*a) / 255.0,
+            (I8, [a, ..]) => (f32::from(*a as i8) / 127.0).max(-1.0),
             (U16, [a, b, ..]) => f32::from(u16::from_le_bytes([*a, *b])) / 65_535.0,
+            (I16, [a, b, ..]) => (f32::from(i16::from_le_bytes([*a, *b])) / 32_767.0).max(-1.0),
             (F32, [a, b, c, d, ..]) => f32::from_le_bytes([*a, *b, *c, *d]),
             _ => fill,
+        })
+    }
+
+    /// Element `i` as four small integers.
+    pub fn joints(&self, i: usize) -> [u16; 4] {
+        let bytes = self.bytes(i).unwrap_or_default();
+        std::array::from_fn(|c| match (self.component, bytes.get(c * self.component.size()..).unwrap_or_default()) {
+            (U8, [a, ..]) => u16::from(*a),
+            (U16, [a, b, ..]) => u16::from_le_bytes([*a, *b]),
+            _ => 0,
         })
     }
 

@@ -3,7 +3,7 @@
 use super::accessor::{self, Elements, Shape};
 use super::buffers::Buffers;
 use super::container::Document;
-use super::{MAX_GEOMETRY_BYTES, topology};
+use super::{MAX_GEOMETRY_BYTES, deformation, topology};
 use crate::error::Result;
 use crate::scene::{Material, Mesh, Scene, TextureRef, tangents};
 use glam::{Vec2, Vec3, Vec4};
@@ -125,6 +125,15 @@ impl Reader<'_> {
             Some(normals) => given_normals(&mesh, normals, &sources, &mut repaired),
             None => flat_normals(&mesh),
         };
+        let deformation = deformation::Reader {
+            document: self.document,
+            buffers: self.buffers,
+            source: self.source,
+            place: self.place,
+            count: positions.count,
+        };
+        mesh.deformation = deformation.read(budget, &sources, warnings)?;
+        mesh.deformation.flat = normals.is_none();
         if repaired > 0 {
             warnings.push(format!("{}: {repaired} attribute(s) were not usable numbers and were replaced", self.place));
         }
