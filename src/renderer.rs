@@ -9,6 +9,7 @@ use crate::gpu::shader::table;
 use crate::gpu_scene::{GpuScene, environment_light};
 use crate::output::Image;
 use crate::params::{FilmParams, Params, RenderParams};
+use crate::scene::stage::Stage;
 use crate::scene::{Camera, FlatScene};
 use crate::techniques::{self, Technique};
 use glam::UVec2;
@@ -62,14 +63,26 @@ pub struct Renderer {
     render_params: RenderParams,
     film_params: FilmParams,
     camera: Camera,
+    /// The camera of the scene that `camera` follows as it moves.
+    followed: Option<usize>,
     /// The camera of the frame before, if its technique left a history.
     previous_camera: Option<Camera>,
     view: u32,
     seed: u32,
     accumulate: bool,
     frame_index: u32,
-    /// Scene time in steps of [`FRAME_TIME`]. It stands still while frames are accumulated.
-    moment: u32,
+    /// What of the scene moves, as it is on the device.
+    stage: Stage,
+    /// The animation that is played.
+    clip: usize,
+    /// Scene time in seconds. It stands still while frames are accumulated.
+    time: f64,
+    /// Where time begins after a reset.
+    start_time: f64,
+    /// Whether the next frame is at `time` itself, not a step after it.
+    time_was_set: bool,
+    /// Seconds of scene time in a second of frames.
+    speed: f64,
     accumulated: u32,
     restart_film: bool,
     /// One line for each shader whose last edit did not compile (debug builds).
@@ -101,12 +114,18 @@ impl Renderer {
             render_params: RenderParams::default(),
             film_params: FilmParams::default(),
             camera,
+            followed: None,
             previous_camera: None,
             view: 0,
             seed: 0,
             accumulate: scene.rig.is_still(),
             frame_index: 0,
-            moment: 0,
+            stage: Stage::new(&scene, 0, 0.0),
+            clip: 0,
+            time: 0.0,
+            start_time: 0.0,
+            time_was_set: true,
+            speed: 1.0,
             accumulated: 0,
             restart_film: true,
             shader_problems: Vec::new(),
@@ -167,8 +186,12 @@ impl Renderer {
         self.gpu.check()?;
         self.gpu_scene = gpu_scene;
         self.accumulate = scene.rig.is_still();
+        self.stage = Stage::new(&scene, 0, 0.0);
         self.scene = scene;
         self.camera = camera;
+        self.followed = None;
+        self.clip = 0;
+        self.set_time(0.0);
         self.reset();
         Ok(())
     }
@@ -271,7 +294,62 @@ impl Renderer {
     /// Moves the camera. The film starts again; the technique keeps its history and reprojects it.
     pub fn set_camera(&mut self, camera: &Camera) {
         self.camera = camera.clone();
+        self.followed = None;
         self.restart_film = true;
+    }
+
+    /// Looks through camera `index` of the scene, and moves with it.
+    ///
+    /// # Errors
+    /// `UNKNOWN_NAME` listing the cameras there are.
+    pub fn follow_camera(&mut self, index: usize) -> Result<()> {
+        let Some(camera) = self.stage.camera(&self.scene, index).filter(|_| index < self.scene.cameras.len()) else {
+            return Err(Error::Unknown {
+                kind: "camera",
+                name: index.to_string(),
+                known: (0..self.scene.cameras.len()).map(|i| i.to_string()).collect::<Vec<_>>().join(", "),
+            });
+        };
+        self.camera = camera;
+        self.followed = Some(index);
+        self.restart_film = true;
+        Ok(())
+    }
+
+    /// Plays another animation of the scene, by name or index, from the moment that time is at.
+    ///
+    /// # Errors
+    /// `UNKNOWN_NAME` listing the animations there are.
+    pub fn set_animation(&mut self, name: &str) -> Result<()> {
+        self.clip = self.scene.rig.find_clip(name)?;
+        self.set_time(self.time);
+        Ok(())
+    }
+
+    /// Index of the animation that is played.
+    pub fn animation(&self) -> usize {
+        self.clip
+    }
+
+    /// Goes to a moment, in seconds: the next frame shows it. The film starts again; the technique keeps its history and
+    /// reprojects it. A reset comes back to this moment. Times that are not finite are ignored.
+    pub fn set_time(&mut self, seconds: f64) {
+        if seconds.is_finite() {
+            (self.time, self.start_time, self.time_was_set) = (seconds, seconds, true);
+            self.restart_film = true;
+        }
+    }
+
+    /// The moment that the last frame showed, or that [`Renderer::set_time`] asks the next one for.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Sets how fast time runs while it does: 1 is a 60th of a second a frame, negative is backwards.
+    pub fn set_speed(&mut self, speed: f64) {
+        if speed.is_finite() {
+            self.speed = speed;
+        }
     }
 
     /// Sets the seed of all random numbers and starts again.
@@ -280,15 +358,16 @@ impl Renderer {
         self.reset();
     }
 
-    /// Whether frames are averaged. On, time stands still where it is; off, each frame is shown alone and lights move.
+    /// Whether frames are averaged. On, time stands still where it is; off, it runs, and each frame is shown alone.
     pub fn set_accumulate(&mut self, accumulate: bool) {
         self.accumulate = accumulate;
         self.restart_film = true;
     }
 
-    /// Starts again: frame 0, time 0, no history, an empty film.
+    /// Starts again: frame 0, the moment last set (0 at first), no history, an empty film.
     pub fn reset(&mut self) {
         self.frame_index = 0;
+        (self.time, self.time_was_set) = (self.start_time, true);
         self.previous_camera = None;
         self.technique_ready = false;
         self.restart_film = true;
@@ -366,16 +445,18 @@ impl Renderer {
 
     /// Goes on to this frame's moment. Where time stands still, nothing has moved since the frame before.
     fn advance_time(&mut self) {
+        if !std::mem::take(&mut self.time_was_set) && !self.accumulate {
+            self.time += self.speed * FRAME_TIME;
+        }
         if self.frame_index == 0 {
-            self.moment = 0;
+            self.stage.start(&self.scene, self.clip, self.time);
+        } else {
+            self.stage.step(&self.scene, self.clip, self.time);
         }
-        let previous = self.moment;
-        if self.frame_index > 0 && !self.accumulate {
-            self.moment = self.moment.wrapping_add(1);
+        self.gpu_scene.take_stage(&self.gpu, &self.scene, &self.stage);
+        if let Some(camera) = self.followed.and_then(|index| self.stage.camera(&self.scene, index)) {
+            self.camera = camera;
         }
-        let [previous, now] =
-            [previous, self.moment].map(|moment| self.scene.rig.pose(0, f64::from(moment) * FRAME_TIME));
-        self.gpu_scene.animate(&self.gpu, &self.scene.rig, &previous, &now);
     }
 
     /// Brings the display buffer up to date with the film.
@@ -410,7 +491,7 @@ impl Renderer {
             environment_light: environment_light(&self.scene),
             view: self.view,
             scene_radius: 0.5 * (high - low).length(),
-            history: self.previous_camera.is_some().into(),
+            history: (self.previous_camera.is_some() && !self.stage.is_renumbered()).into(),
             pixel_filter: self.render_params.pixel_filter,
             padding: 0,
         }
