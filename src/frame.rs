@@ -40,8 +40,16 @@ pub struct Frame {
     pub history: u32,
     /// 0 box, 1 centre.
     pub pixel_filter: u32,
+    /// Root of the top-level BVH in `nodes`.
+    pub top_level: u32,
+    /// The same of the previous frame.
+    pub previous_top_level: u32,
+    /// Instances of the scene; their twins come after as many.
+    pub instance_count: u32,
     /// Unused.
-    pub padding: u32,
+    pub padding_0: u32,
+    /// Unused.
+    pub padding_1: u32,
 }
 }
 

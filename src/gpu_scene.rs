@@ -1,27 +1,38 @@
 //! The uploaded scene: the buffers and textures of bind group 0, all but the frame uniform.
 
+mod motion;
+
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::gpu::data_texture::DataTexture;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
 use crate::scene::FlatScene;
-use crate::scene::gpu_types::{LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK};
-use crate::scene::rig::{Pose, Rig};
-use glam::Vec3;
+use crate::scene::gpu_types::{LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK, Triangle};
+use crate::scene::stage::Stage;
+use motion::Motion;
+
+/// Triangles in the first of the two buffers: 128 MiB, what every WebGPU device can bind. As in `shaders/scene/data.wgsl`.
+const FIRST_TRIANGLES: usize = (128 << 20) / size_of::<Triangle>();
 
 /// A [`FlatScene`] on the device.
 #[derive(Debug)]
 pub struct GpuScene {
     nodes: wgpu::Buffer,
-    triangles: wgpu::Buffer,
-    materials: wgpu::Buffer,
+    /// The first [`FIRST_TRIANGLES`], and all others.
+    triangles: [wgpu::Buffer; 2],
     lights: wgpu::Buffer,
+    attributes: DataTexture,
+    materials: DataTexture,
+    instances: DataTexture,
+    instance_count: u32,
+    /// Index in `nodes` of the root of everything.
+    top_level: u32,
     atlas: wgpu::TextureView,
     environment_radiance: wgpu::TextureView,
     environment_alias: wgpu::TextureView,
-    /// The punctual lights as they are uploaded now, from `first_punctual` on.
-    punctual: Vec<Light>,
-    first_punctual: u32,
+    /// Where what moves lies; none in a scene that stands still.
+    motion: Option<Motion>,
     features: SceneFeatures,
 }
 
@@ -56,17 +67,24 @@ impl GpuScene {
             Some(e) => ([e.width, e.height, 1], &e.radiance, &e.alias),
             None => (black.0, &black.1, &black.2),
         };
-        let first = scene.first_punctual as usize;
-        let punctual: Vec<Light> =
-            scene.lights.iter().skip(first).filter(|l| l.kind != LIGHT_ENVIRONMENT).copied().collect();
+        let (motion, arrays) = Motion::lay_out(scene);
+        let (first_triangles, rest) = arrays.triangles.split_at(arrays.triangles.len().min(FIRST_TRIANGLES));
+        let point = [bytemuck::Zeroable::zeroed()];
         Ok(GpuScene {
-            nodes: gpu.storage_of("nodes", &scene.nodes)?,
-            triangles: gpu.storage_of("triangles", &scene.triangles)?,
-            materials: gpu.storage_of("materials", &scene.materials)?,
-            lights: if scene.lights.is_empty() {
+            nodes: gpu.storage_of("nodes", &arrays.nodes)?,
+            triangles: [
+                gpu.storage_of("triangles", first_triangles)?,
+                gpu.storage_of("the triangles after the first 2796202", if rest.is_empty() { &point } else { rest })?,
+            ],
+            attributes: DataTexture::new(gpu, "attributes", &arrays.attributes)?,
+            materials: DataTexture::new(gpu, "materials", &scene.materials)?,
+            instances: DataTexture::new(gpu, "instances", &arrays.instances)?,
+            instance_count: scene.instances.len() as u32,
+            top_level: scene.root(),
+            lights: if arrays.lights.is_empty() {
                 gpu.storage("lights", std::mem::size_of::<Light>() as u64)?
             } else {
-                gpu.storage_of("lights", &scene.lights)?
+                gpu.storage_of("lights", &arrays.lights)?
             },
             atlas: atlas.create_view(&wgpu::TextureViewDescriptor {
                 dimension: Some(wgpu::TextureViewDimension::D2Array),
@@ -88,40 +106,68 @@ impl GpuScene {
                 bytemuck::cast_slice(alias),
             )
             .create_view(&Default::default()),
-            punctual,
-            first_punctual: scene.first_punctual,
+            motion,
             features: features(scene),
         })
     }
 
-    /// Puts the lights that move where `pose` has them, coming from where they were at `previous`.
-    pub fn animate(&mut self, gpu: &Gpu, rig: &Rig, previous: &Pose, pose: &Pose) {
-        if rig.lights.is_empty() {
-            return;
+    /// Brings the device up to date with what moves: this frame's transforms, shapes and lights, and those of the frame
+    /// before. Both top levels are rebuilt; a transform that cannot be undone hides its instance.
+    pub fn take_stage(&mut self, gpu: &Gpu, scene: &FlatScene, stage: &Stage) {
+        if let Some(mut motion) = self.motion.take() {
+            if motion.version != Some(stage.version()) {
+                motion.take_shapes(gpu, self, scene, stage);
+                motion.version = Some(stage.version());
+                motion.at_rest = false;
+            } else if !motion.at_rest {
+                motion.stand_still();
+            }
+            if !motion.at_rest {
+                motion.place(gpu, self, scene, stage);
+                motion.at_rest = !stage.has_moved();
+            }
+            self.motion = Some(motion);
         }
-        for attached in &rig.lights {
-            let Some(light) = self.punctual.get_mut(attached.target as usize) else { continue };
-            let [before, now] = [previous, pose].map(|pose| pose.node(attached.node));
-            light.previous_position = before.w_axis.truncate();
-            light.position = now.w_axis.truncate();
-            light.direction = now.transform_vector3(Vec3::NEG_Z).try_normalize().unwrap_or(light.direction);
-        }
-        let offset = u64::from(self.first_punctual) * std::mem::size_of::<Light>() as u64;
-        gpu.queue.write_buffer(&self.lights, offset, bytemuck::cast_slice(&self.punctual));
     }
 
-    /// The punctual lights as they are uploaded now, in the order of the scene.
-    pub fn punctual_lights(&self) -> &[Light] {
-        &self.punctual
+    /// Overwrites triangles from index `first` on, in whichever buffer they lie.
+    fn write_triangles(&self, gpu: &Gpu, first: u32, triangles: &[Triangle]) {
+        let first = first as usize;
+        let (low, high) = triangles.split_at(FIRST_TRIANGLES.saturating_sub(first).min(triangles.len()));
+        let write = |buffer: &wgpu::Buffer, index: usize, part: &[Triangle]| {
+            if !part.is_empty() {
+                gpu.queue.write_buffer(buffer, (index * size_of::<Triangle>()) as u64, bytemuck::cast_slice(part));
+            }
+        };
+        write(&self.triangles[0], first, low);
+        write(&self.triangles[1], (first + low.len()).saturating_sub(FIRST_TRIANGLES), high);
+    }
+
+    /// Index in `nodes` of the root of everything as it was in the frame before.
+    pub fn previous_top_level(&self) -> u32 {
+        self.motion.as_ref().map_or(self.top_level, |motion| motion.previous_top_level)
+    }
+
+    /// Instances, without their twins of the frame before.
+    pub fn instance_count(&self) -> u32 {
+        self.instance_count
+    }
+
+    /// Index in `nodes` of the root of everything.
+    pub fn top_level(&self) -> u32 {
+        self.top_level
     }
 
     /// Binds everything for the passes of a frame.
     pub fn share<'a>(&'a self, recorder: &mut Recorder<'a>) {
         recorder.features = self.features;
         recorder.share("nodes", &self.nodes);
-        recorder.share("triangles", &self.triangles);
-        recorder.share("materials", &self.materials);
+        recorder.share("triangles", &self.triangles[0]);
+        recorder.share("triangles_rest", &self.triangles[1]);
         recorder.share("lights", &self.lights);
+        recorder.share("attributes", &self.attributes.view);
+        recorder.share("materials", &self.materials.view);
+        recorder.share("instances", &self.instances.view);
         recorder.share("atlas", &self.atlas);
         recorder.share("environment_radiance", &self.environment_radiance);
         recorder.share("environment_alias", &self.environment_alias);
@@ -138,6 +184,9 @@ fn features(scene: &FlatScene) -> SceneFeatures {
         alpha_masks: scene.triangles.iter().any(|t| t.flags & TRIANGLE_ALPHA_MASK != 0),
         environment: environment_light(scene) != NONE,
         punctual_lights: scene.lights.iter().any(|l| l.kind != LIGHT_TRIANGLE && l.kind != LIGHT_ENVIRONMENT),
+        instances: scene.has_top_level(),
+        motion: !scene.rig.is_still(),
+        many_triangles: motion::triangle_count(scene) > FIRST_TRIANGLES,
     }
 }
 

@@ -32,6 +32,8 @@ pub fn gpu_layouts() -> Vec<scene::gpu_types::Layout> {
     let shared = [
         types::BvhNode::LAYOUT,
         types::Triangle::LAYOUT,
+        types::TriangleAttributes::LAYOUT,
+        types::Instance::LAYOUT,
         types::TextureSlot::LAYOUT,
         types::Material::LAYOUT,
         types::Light::LAYOUT,

@@ -15,7 +15,7 @@ use crate::techniques::{self, Technique};
 use glam::UVec2;
 
 /// Debug views that every technique has; the first is the picture itself.
-pub const COMMON_VIEWS: &[&str] = &["radiance", "albedo", "normal", "depth"];
+pub const COMMON_VIEWS: &[&str] = &["radiance", "albedo", "normal", "depth", "motion"];
 
 /// `Frame::view` of the common views after the first, as `shaders/film/view.wgsl` numbers them.
 const FIRST_COMMON_VIEW: u32 = 1000;
@@ -32,6 +32,9 @@ pub struct Auxiliary {
     pub normal: Vec<[f32; 3]>,
     /// Distance along the view axis in metres.
     pub depth: Vec<f32>,
+    /// How far what the pixel sees has moved since the frame before, in pixels, x to the right and y down. Not zero where
+    /// there is no surface: the background moves with the camera's turn.
+    pub motion: Vec<[f32; 2]>,
 }
 
 /// What was counted.
@@ -58,6 +61,7 @@ pub struct Renderer {
     visibility: [wgpu::TextureView; 2],
     albedo_depth: wgpu::TextureView,
     normal: wgpu::TextureView,
+    motion: wgpu::TextureView,
     timer: Option<Timer>,
     display_timer: Option<Timer>,
     render_params: RenderParams,
@@ -65,8 +69,10 @@ pub struct Renderer {
     camera: Camera,
     /// The camera of the scene that `camera` follows as it moves.
     followed: Option<usize>,
-    /// The camera of the frame before, if its technique left a history.
+    /// The camera of the frame before, if there was one.
     previous_camera: Option<Camera>,
+    /// Whether the frame before ran the technique, so that it has a history.
+    has_history: bool,
     view: u32,
     seed: u32,
     accumulate: bool,
@@ -99,7 +105,7 @@ impl Renderer {
         let film = Film::new(&gpu, size)?;
         let camera = scene.cameras.first().cloned().ok_or_else(|| Error::bad_value("scene", "has no camera"))?;
         let technique = (techniques::ALL[0].create)(&gpu);
-        let [albedo_depth, normal] = auxiliary_textures(&gpu, size);
+        let [albedo_depth, normal, motion] = auxiliary_textures(&gpu, size);
         let renderer = Renderer {
             gpu_scene,
             technique,
@@ -109,6 +115,7 @@ impl Renderer {
             visibility: visibility_textures(&gpu, size),
             albedo_depth,
             normal,
+            motion,
             timer: Timer::new(&gpu),
             display_timer: Timer::new(&gpu),
             render_params: RenderParams::default(),
@@ -116,6 +123,7 @@ impl Renderer {
             camera,
             followed: None,
             previous_camera: None,
+            has_history: false,
             view: 0,
             seed: 0,
             accumulate: scene.rig.is_still(),
@@ -149,6 +157,11 @@ impl Renderer {
     /// The scene as it is on the device now.
     pub fn gpu_scene(&self) -> &GpuScene {
         &self.gpu_scene
+    }
+
+    /// What of the scene moves, as the last frame showed it.
+    pub fn stage(&self) -> &Stage {
+        &self.stage
     }
 
     /// The film.
@@ -369,6 +382,7 @@ impl Renderer {
         self.frame_index = 0;
         (self.time, self.time_was_set) = (self.start_time, true);
         self.previous_camera = None;
+        self.has_history = false;
         self.technique_ready = false;
         self.restart_film = true;
     }
@@ -385,7 +399,7 @@ impl Renderer {
         self.technique.prepare(&self.gpu, size)?;
         self.film = film;
         self.visibility = visibility_textures(&self.gpu, size);
-        [self.albedo_depth, self.normal] = auxiliary_textures(&self.gpu, size);
+        [self.albedo_depth, self.normal, self.motion] = auxiliary_textures(&self.gpu, size);
         self.reset();
         self.gpu.check()
     }
@@ -423,11 +437,12 @@ impl Renderer {
         recorder.share("previous_visibility", &self.visibility[1 - parity]);
         recorder.pass(&table::SCENE_VISIBILITY).bind("visibility_out", &self.visibility[parity]).dispatch_over(size)?;
         if self.view >= FIRST_COMMON_VIEW {
-            record_auxiliary(&mut recorder, &self.albedo_depth, &self.normal, size)?;
+            record_auxiliary(&mut recorder, [&self.albedo_depth, &self.normal, &self.motion], size)?;
             recorder
                 .pass(&table::FILM_VIEW)
                 .bind("albedo_depth", &self.albedo_depth)
                 .bind("normal", &self.normal)
+                .bind("motion", &self.motion)
                 .dispatch_over(size)?;
         } else {
             self.technique.record(&mut recorder, size)?;
@@ -437,8 +452,9 @@ impl Renderer {
 
         self.accumulated = if restart { 1 } else { self.accumulated + 1 };
         self.restart_film = false;
+        self.previous_camera = Some(self.camera.clone());
         // The common views run no technique, and leave its history as old as it was.
-        self.previous_camera = (self.view < FIRST_COMMON_VIEW).then(|| self.camera.clone());
+        self.has_history = self.view < FIRST_COMMON_VIEW;
         self.frame_index = self.frame_index.wrapping_add(1);
         self.gpu.check()
     }
@@ -491,9 +507,13 @@ impl Renderer {
             environment_light: environment_light(&self.scene),
             view: self.view,
             scene_radius: 0.5 * (high - low).length(),
-            history: (self.previous_camera.is_some() && !self.stage.is_renumbered()).into(),
+            history: (self.has_history && !self.stage.is_renumbered()).into(),
             pixel_filter: self.render_params.pixel_filter,
-            padding: 0,
+            top_level: self.gpu_scene.top_level(),
+            previous_top_level: self.gpu_scene.previous_top_level(),
+            instance_count: self.gpu_scene.instance_count(),
+            padding_0: 0,
+            padding_1: 0,
         }
     }
 
@@ -548,7 +568,7 @@ impl Renderer {
         self.gpu_scene.share(&mut recorder);
         recorder.share("frame", &self.frame_uniform);
         recorder.share("visibility", &self.visibility[(self.frame_index.wrapping_sub(1) & 1) as usize]);
-        record_auxiliary(&mut recorder, &self.albedo_depth, &self.normal, self.size())?;
+        record_auxiliary(&mut recorder, [&self.albedo_depth, &self.normal, &self.motion], self.size())?;
         recorder.submit();
         let mut out = Auxiliary::default();
         for texel in self.gpu.read_texture(self.albedo_depth.texture(), 16).await?.chunks_exact(16) {
@@ -559,6 +579,10 @@ impl Renderer {
         for texel in self.gpu.read_texture(self.normal.texture(), 16).await?.chunks_exact(16) {
             let [x, y, z, _]: [f32; 4] = bytemuck::pod_read_unaligned(texel);
             out.normal.push([x, y, z]);
+        }
+        for texel in self.gpu.read_texture(self.motion.texture(), 16).await?.chunks_exact(16) {
+            let [x, y, ..]: [f32; 4] = bytemuck::pod_read_unaligned(texel);
+            out.motion.push([x, y]);
         }
         Ok(out)
     }
@@ -597,19 +621,19 @@ fn visibility_textures(gpu: &Gpu, size: UVec2) -> [wgpu::TextureView; 2] {
     [0, 1].map(|_| gpu.texture("visibility", size, wgpu::TextureFormat::Rgba32Uint))
 }
 
-fn auxiliary_textures(gpu: &Gpu, size: UVec2) -> [wgpu::TextureView; 2] {
-    ["albedo and depth", "normal"].map(|label| gpu.texture(label, size, wgpu::TextureFormat::Rgba32Float))
+fn auxiliary_textures(gpu: &Gpu, size: UVec2) -> [wgpu::TextureView; 3] {
+    ["albedo and depth", "normal", "motion"].map(|label| gpu.texture(label, size, wgpu::TextureFormat::Rgba32Float))
 }
 
 fn record_auxiliary(
     recorder: &mut Recorder<'_>,
-    albedo_depth: &wgpu::TextureView,
-    normal: &wgpu::TextureView,
+    [albedo_depth, normal, motion]: [&wgpu::TextureView; 3],
     size: UVec2,
 ) -> Result<()> {
     recorder
         .pass(&table::SCENE_AUXILIARY)
         .bind("albedo_depth_out", albedo_depth)
         .bind("normal_out", normal)
+        .bind("motion_out", motion)
         .dispatch_over(size)
 }

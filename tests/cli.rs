@@ -80,6 +80,7 @@ fn exr(folder: &Folder, name: &str, width: u32, height: u32, value: f32) -> Stri
         albedo: None,
         normal: None,
         depth: None,
+        motion: None,
         technique: "none",
         parameters: "{}",
         seed: 0,

@@ -6,7 +6,7 @@ use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use obvhs::ray::{Ray, RayHit};
 use restir::Error;
 use restir::scene::gpu_types::{
-    LIGHT_ENVIRONMENT, NONE, TRIANGLE_BITANGENT_SHIFT, TRIANGLE_DOUBLE_SIDED, TRIANGLE_TANGENTS, Triangle,
+    BITANGENT_SHIFT, LIGHT_ENVIRONMENT, NONE, TRIANGLE_DOUBLE_SIDED, TRIANGLE_TANGENTS, Triangle,
 };
 use restir::scene::intersect::{Hit, intersect_cpu, intersect_triangle};
 use restir::scene::random::Random;
@@ -53,7 +53,7 @@ fn brute_force(scene: &FlatScene, origin: Vec3, direction: Vec3, t_max: f32) -> 
     for (triangle, i) in scene.triangles.iter().zip(0..) {
         let limit = closest.map_or(t_max, |hit| hit.t);
         if let Some((t, u, v)) = intersect_triangle(triangle, origin, direction, limit) {
-            closest = Some(Hit { t, triangle: i, u, v });
+            closest = Some(Hit { t, triangle: i, u, v, instance: 0 });
         }
     }
     closest
@@ -143,17 +143,17 @@ fn mirrored_instances_keep_their_front_and_bitangent() {
         let transform = Mat4::from_rotation_y(0.4) * Mat4::from_scale(scale);
         let flat = flatten(&scene_of(vec![(mapped(), transform)]));
         let front = transform.inverse().transpose().transform_vector3(Vec3::Z).normalize();
-        for triangle in &flat.triangles {
+        for (triangle, attributes) in flat.triangles.iter().zip(&flat.attributes) {
             let face = (triangle.p1 - triangle.p0).cross(triangle.p2 - triangle.p0).normalize();
             assert!(face.distance(front) < 1e-5, "{scale}");
             assert_eq!(triangle.flags & TRIANGLE_TANGENTS, TRIANGLE_TANGENTS);
-            let normal = octahedral::unpack(triangle.normal_1);
+            let normal = octahedral::unpack(attributes.normals[1]);
             assert!(normal.distance(front) < 1e-3);
             let (b1, b2) = octahedral::orthonormal_basis(normal);
-            let (sin, cos) = ((triangle.tangents >> 16) as f32 / 65536.0 * std::f32::consts::TAU).sin_cos();
+            let (sin, cos) = ((attributes.tangents_01 >> 16) as f32 / 65536.0 * std::f32::consts::TAU).sin_cos();
             let tangent = b1 * cos + b2 * sin;
             assert!(tangent.distance(transform.transform_vector3(Vec3::X).normalize()) < 1e-3);
-            let sign = if triangle.flags >> (TRIANGLE_BITANGENT_SHIFT + 1) & 1 == 1 { -1.0 } else { 1.0 };
+            let sign = if attributes.tangent_2 >> (BITANGENT_SHIFT + 1) & 1 == 1 { -1.0 } else { 1.0 };
             let bitangent = sign * normal.cross(tangent);
             assert!(bitangent.distance(transform.transform_vector3(Vec3::Y).normalize()) < 1e-3, "{scale}");
         }
@@ -164,10 +164,11 @@ fn mirrored_instances_keep_their_front_and_bitangent() {
 fn normals_follow_the_inverse_transpose() {
     let mesh = shapes::sphere(Vec3::ZERO, 1.0, 16, 0);
     let transform = Mat4::from_scale(Vec3::new(1.0, 4.0, 0.5));
-    for triangle in flatten(&scene_of(vec![(mesh, transform)])).triangles {
+    let flat = flatten(&scene_of(vec![(mesh, transform)]));
+    for (triangle, attributes) in flat.triangles.iter().zip(&flat.attributes) {
         // The gradient of the ellipsoid.
         let expected = (triangle.p0 / Vec3::new(1.0, 16.0, 0.25)).normalize();
-        assert!(octahedral::unpack(triangle.normal_0).distance(expected) < 1e-3);
+        assert!(octahedral::unpack(attributes.normals[0]).distance(expected) < 1e-3);
     }
 }
 
@@ -181,13 +182,13 @@ fn corners_keep_their_attributes_in_a_mirror() {
         ..Mesh::default()
     };
     let flat = flatten(&scene_of(vec![(mesh, Mat4::from_scale(Vec3::new(-1.0, 1.0, 1.0)))]));
-    let triangle = flat.triangles[0];
+    let (triangle, attributes) = (flat.triangles[0], flat.attributes[0]);
     assert_eq!((triangle.p1, triangle.p2), (Vec3::Y, Vec3::NEG_X));
-    assert_eq!(triangle.uv_a, Vec4::new(0.0, 0.0, 0.0, 1.0));
-    assert_eq!(triangle.uv_b, Vec4::new(1.0, 0.0, 3.0, 3.0));
-    assert_eq!(triangle.uv_c, Vec4::new(5.0, 5.0, 4.0, 4.0));
-    assert_eq!([triangle.color_0, triangle.color_1, triangle.color_2], [0, u32::MAX, 0xff00_80ff]);
-    assert!(octahedral::unpack(triangle.normal_0).distance(Vec3::Z) < 1e-4, "missing normals are the face's");
+    assert_eq!(attributes.uv_a, Vec4::new(0.0, 0.0, 0.0, 1.0));
+    assert_eq!(attributes.uv_b, Vec4::new(1.0, 0.0, 3.0, 3.0));
+    assert_eq!(attributes.uv_c, Vec4::new(5.0, 5.0, 4.0, 4.0));
+    assert_eq!(attributes.colors, [0, u32::MAX, 0xff00_80ff]);
+    assert!(octahedral::unpack(attributes.normals[0]).distance(Vec3::Z) < 1e-4, "missing normals are the face's");
 }
 
 #[test]
@@ -200,7 +201,7 @@ fn useless_triangles_are_dropped_and_counted() {
     };
     let flat = flatten(&scene_of(vec![(mesh, Mat4::IDENTITY)]));
     assert_eq!((flat.triangles.len(), flat.stats.dropped_triangles, flat.warnings.len()), (1, 4, 1));
-    assert!(octahedral::unpack(flat.triangles[0].normal_0).distance(Vec3::Z) < 1e-4, "zero normals are the face's");
+    assert!(octahedral::unpack(flat.attributes[0].normals[0]).distance(Vec3::Z) < 1e-4, "zero normals are the face's");
 }
 
 #[test]
@@ -377,12 +378,18 @@ fn mutated_bytes_never_panic_and_what_passes_can_be_traced() {
 #[test]
 fn planted_faults_are_found() {
     let sound = rich();
-    let faults: [Fault<FlatScene>; 14] = [
+    let faults: [Fault<FlatScene>; 20] = [
         ("nodes[0]", |flat| flat.nodes[0].first = 0),
         ("nodes[0]", |flat| flat.nodes[0].first = flat.nodes.len() as u32 - 1),
         ("nodes[0]", |flat| (flat.nodes[0].first, flat.nodes[0].count) = (0, u32::MAX)),
         ("nodes[0]", |flat| flat.nodes[0].min.x = f32::NAN),
-        ("nodes", |flat| flat.nodes.clear()),
+        ("meshes[0]", |flat| flat.nodes.clear()),
+        ("meshes", |flat| flat.meshes.clear()),
+        ("instances", |flat| flat.instances.clear()),
+        ("instances[0]", |flat| flat.instances[0].mesh = 1),
+        ("instances[0]", |flat| flat.instances[0].transform.x_axis.x = f32::NAN),
+        ("attributes", |flat| flat.attributes.truncate(2)),
+        ("attributes[2]", |flat| flat.attributes[2].uv_b.x = f32::INFINITY),
         ("triangles[3]", |flat| flat.triangles[3].material = 4),
         ("triangles[3]", |flat| flat.triangles[3].light = 1000),
         ("triangles[3]", |flat| flat.triangles[3].p1.y = f32::INFINITY),

@@ -4,7 +4,7 @@ mod support;
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use restir::gpu::shader::table;
-use restir::scene::gpu_types::{TRIANGLE_BITANGENT_SHIFT, TRIANGLE_TANGENTS};
+use restir::scene::gpu_types::{BITANGENT_SHIFT, TRIANGLE_TANGENTS};
 use restir::scene::random::Random;
 use restir::scene::{
     AlphaMode, Environment, FlatScene, Instance, Material, PunctualKind, PunctualLight, Scene, Texture, TextureRef,
@@ -777,7 +777,7 @@ fn masked_light_shines_only_where_it_is() {
     for ((light, point), output) in
         cases.iter().zip(scene_functions(&flat, scene_functions::LIGHT_CONTRIBUTION, &inputs))
     {
-        let triangle = &flat.triangles[flat.lights[*light as usize].triangle as usize];
+        let triangle = &flat.attributes[flat.lights[*light as usize].triangle as usize];
         let [r, v] = [point & 0xffff, point >> 16].map(|q| (f64::from(q) + 0.5) / 65536.0);
         let (b1, b2) = (r.sqrt() * (1.0 - v), r.sqrt() * v);
         let u = (1.0 - b1 - b2) * f64::from(triangle.uv_a.x)
@@ -809,16 +809,16 @@ fn mapped_normals_follow_mikktspace() {
     let mut flat = flatten(&scene);
     // Corner normals far apart, so that their mean is much shorter than 1; tangents as they come.
     let mut random = Random::new(18);
-    let triangle = &mut flat.triangles[0];
+    let triangle = &mut flat.attributes[0];
     let [n0, n1, n2] = [Vec3::new(0.9, 0.4, 0.0), Vec3::new(-0.7, 0.5, 0.5), Vec3::new(-0.1, 0.4, -0.9)];
-    (triangle.normal_0, triangle.normal_1, triangle.normal_2) =
-        (octahedral::pack(n0.normalize()), octahedral::pack(n1.normalize()), octahedral::pack(n2.normalize()));
-    triangle.tangents = random.next_u32();
-    // Tangents present, the bitangent of corner 1 turned, the angle of corner 2.
-    triangle.flags |= TRIANGLE_TANGENTS | 1 << (TRIANGLE_BITANGENT_SHIFT + 1) | 0x5a3c << 16;
-    let angles = [triangle.tangents & 0xffff, triangle.tangents >> 16, triangle.flags >> 16];
-    let corners = [triangle.normal_0, triangle.normal_1, triangle.normal_2].map(octahedral::unpack);
-    let flags = triangle.flags;
+    triangle.normals = [n0, n1, n2].map(|n| octahedral::pack(n.normalize()));
+    triangle.tangents_01 = random.next_u32();
+    // The bitangent of corner 1 turned, the angle of corner 2.
+    triangle.tangent_2 = 1 << (BITANGENT_SHIFT + 1) | 0x5a3c;
+    let angles = [triangle.tangents_01 & 0xffff, triangle.tangents_01 >> 16, triangle.tangent_2 & 0xffff];
+    let corners = triangle.normals.map(octahedral::unpack);
+    let flags = triangle.tangent_2;
+    flat.triangles[0].flags |= TRIANGLE_TANGENTS;
 
     let uvs: Vec<Vec2> = (0..200)
         .map(|_| {
@@ -836,7 +836,7 @@ fn mapped_normals_follow_mikktspace() {
             let (tangent, bitangent) = octahedral::orthonormal_basis(corners[corner]);
             let (sin, cos) = (f64::from(angles[corner]) * TAU / 65536.0).sin_cos();
             let tangent = d(tangent) * cos + d(bitangent) * sin;
-            let sign = if flags >> (TRIANGLE_BITANGENT_SHIFT as usize + corner) & 1 == 0 { 1.0 } else { -1.0 };
+            let sign = if flags >> (BITANGENT_SHIFT as usize + corner) & 1 == 0 { 1.0 } else { -1.0 };
             n += weights[corner] * d(corners[corner]);
             t += weights[corner] * tangent;
             b += weights[corner] * sign * d(corners[corner]).cross(tangent);

@@ -54,19 +54,24 @@ fn traverse(scene: &FlatScene, rays: &[Ray], any_hit: bool) -> Vec<Option<Hit>> 
                 return None;
             }
             assert!(t > 0.0 && t < ray.t_max && u >= 0.0 && v >= 0.0 && u + v <= 1.0, "{ray:?}: {t} {u} {v}");
-            Some(Hit { t, triangle: output.a[1], u, v })
+            Some(Hit { t, triangle: output.a[1], u, v, instance: output.b[0] })
         })
         .collect()
 }
 
 fn brute_force(scene: &FlatScene, ray: &Ray, exists: &dyn Fn(u32, Vec2) -> bool) -> Option<Hit> {
     let mut closest: Option<Hit> = None;
-    for (triangle, i) in scene.triangles.iter().zip(0..) {
-        let limit = closest.map_or(ray.t_max, |h| h.t);
-        if let Some((t, u, v)) = intersect_triangle(triangle, ray.origin, ray.direction, limit)
-            && exists(i, Vec2::new(u, v))
-        {
-            closest = Some(Hit { t, triangle: i, u, v });
+    for (placed, instance) in scene.instances.iter().zip(0..) {
+        let mesh = &scene.meshes[placed.mesh as usize];
+        let to_object = placed.transform.inverse();
+        let (origin, direction) = (to_object.transform_point3(ray.origin), to_object.transform_vector3(ray.direction));
+        for i in mesh.first_triangle..mesh.first_triangle + mesh.triangles {
+            let limit = closest.map_or(ray.t_max, |h| h.t);
+            if let Some((t, u, v)) = intersect_triangle(&scene.triangles[i as usize], origin, direction, limit)
+                && exists(i, Vec2::new(u, v))
+            {
+                closest = Some(Hit { t, triangle: i, u, v, instance });
+            }
         }
     }
     closest
@@ -92,7 +97,7 @@ fn check(name: &str, scene: &FlatScene, rays: &[Ray]) {
         let cpu = intersect_cpu(scene, ray.origin, ray.direction, ray.t_max);
         mismatches += usize::from(!agree(closest, &cpu));
     }
-    let every = (rays.len() * scene.triangles.len()).div_ceil(4_000_000);
+    let every = (rays.len() * scene.stats.placed_triangles as usize).div_ceil(4_000_000).max(1);
     let mut brute_mismatches = 0;
     for (ray, closest) in rays.iter().zip(&closest).step_by(every) {
         let expected = brute_force(scene, ray, &|_, _| true);
@@ -117,11 +122,13 @@ fn rays_of(scene: &FlatScene, count: usize, seed: u64) -> Vec<Ray> {
             let origin = random.in_box(low - margin, high + margin);
             let mut direction = random.direction();
             if i % 2 == 0 {
-                let triangle = &scene.triangles[random.next_u32() as usize % scene.triangles.len()];
+                let placed = &scene.instances[random.next_u32() as usize % scene.instances.len()];
+                let mesh = &scene.meshes[placed.mesh as usize];
+                let triangle = &scene.triangles[(mesh.first_triangle + random.next_u32() % mesh.triangles) as usize];
                 let (u, v) = (random.unit(), random.unit());
                 let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
                 let target = triangle.p0 + u * (triangle.p1 - triangle.p0) + v * (triangle.p2 - triangle.p0);
-                direction = (target - origin).normalize_or(Vec3::Z);
+                direction = (placed.transform.transform_point3(target) - origin).normalize_or(Vec3::Z);
             }
             // Every third ray is cut short somewhere.
             let t_max = if i % 3 == 0 { random.unit() * (high - low).length() } else { FAR };
@@ -185,6 +192,31 @@ fn long_thin_triangles() {
         (Vec3::new(1.0, 0.7, -0.4) * random.range(-3.0, 3.0) + 0.02 * random.direction()) * size
     });
     check("needles across", &scene, &rays_of(&scene, 20_000, 16));
+}
+
+/// 60 copies of a ball of 5000 triangles, stretched, turned and mirrored, share one bottom level; a floor is merged.
+fn shared_balls() -> Scene {
+    let mut random = Random::new(21);
+    let ball = shapes::sphere(Vec3::ZERO, 1.0, 50, 0);
+    let mut scene = scene_of(ball, Material::default());
+    scene.meshes.push(shapes::parallelogram(Vec3::new(-30.0, -3.0, 30.0), Vec3::X * 60.0, Vec3::Z * -60.0, 0));
+    scene.instances = vec![Instance { mesh: 1, transform: Mat4::IDENTITY }];
+    for i in 0..60 {
+        let mirror = if i % 3 == 0 { -1.0 } else { 1.0 };
+        let size = Vec3::new(mirror * random.range(0.3, 1.5), random.range(0.3, 1.5), random.range(0.3, 1.5));
+        let turn = glam::Quat::from_axis_angle(random.direction(), random.range(0.0, 6.0));
+        let place = random.in_box(Vec3::new(-9.0, -2.0, -9.0), Vec3::new(9.0, 6.0, 9.0));
+        scene.instances.push(Instance { mesh: 0, transform: Mat4::from_scale_rotation_translation(size, turn, place) });
+    }
+    scene
+}
+
+#[test]
+fn instances_share_a_bottom_level() {
+    let scene = flatten(&shared_balls());
+    assert_eq!((scene.meshes.len(), scene.instances.len()), (2, 61), "the floor is merged, the balls are shared");
+    assert!(scene.stats.placed_triangles > 50 * scene.stats.triangles / 2, "{:?}", scene.stats);
+    check("instances", &scene, &rays_of(&scene, 20_000, 22));
 }
 
 #[test]
@@ -295,7 +327,7 @@ fn masked_holes_let_rays_through() {
     }
     let flat = flatten(&scene);
     let uv_of = |triangle: u32, b: Vec2| {
-        let t = &flat.triangles[triangle as usize];
+        let t = &flat.attributes[triangle as usize];
         let uv = |x: f32, y: f32| Vec2::new(x, y);
         (1.0 - b.x - b.y) * uv(t.uv_a.x, t.uv_a.y) + b.x * uv(t.uv_a.z, t.uv_a.w) + b.y * uv(t.uv_b.x, t.uv_b.y)
     };

@@ -31,7 +31,11 @@ struct Frame {
     scene_radius: f32, // metres
     history: u32, // 1 if the previous frame's buffers may be read
     pixel_filter: u32, // PIXEL_FILTER_BOX or PIXEL_FILTER_CENTER
-    padding: u32,
+    top_level: u32, // root of the top-level BVH in `nodes`
+    previous_top_level: u32, // the same of the previous frame
+    instance_count: u32, // the twins of instances, as they were in the previous frame, come after as many
+    padding_0: u32,
+    padding_1: u32,
 }
 
 struct BvhNode {
@@ -43,22 +47,30 @@ struct BvhNode {
 
 struct Triangle {
     p0: vec3f,
-    material: u32,
+    flags: u32,
     p1: vec3f,
-    light: u32,
+    material: u32,
     p2: vec3f,
-    instance: u32,
+    light: u32,
+}
+
+struct TriangleAttributes {
     uv_a: vec4f,
     uv_b: vec4f,
     uv_c: vec4f,
-    normal_0: u32,
-    normal_1: u32,
-    normal_2: u32,
-    tangents: u32,
-    color_0: u32,
-    color_1: u32,
-    color_2: u32,
-    flags: u32,
+    normals: vec3u,
+    tangents_01: u32,
+    colors: vec3u,
+    tangent_2: u32,
+}
+
+struct Instance {
+    to_object: array<vec4f, 3>,
+    to_world: array<vec4f, 3>,
+    root: u32,
+    first_light: u32,
+    previous_triangles: u32,
+    padding: u32,
 }
 
 struct TextureSlot {
@@ -89,8 +101,6 @@ struct Material {
 struct Light {
     position: vec3f,
     kind: u32,
-    previous_position: vec3f,
-    triangle: u32,
     direction: vec3f,
     range: f32,
     intensity: vec3f,
@@ -99,6 +109,10 @@ struct Light {
     pmf: f32, // p(light)
     alias_threshold: f32,
     alias_light: u32,
+    triangle: u32,
+    instance: u32,
+    previous: u32, // this light as it was in the previous frame
+    padding: u32,
 }
 
 // What the scene has, fixed when a pipeline is made (src/gpu_scene.rs), so that no kernel carries code that its scene
@@ -107,12 +121,21 @@ override scene_has_textures: bool = true;
 override scene_has_alpha_masks: bool = true;
 override scene_has_environment: bool = true;
 override scene_has_punctual_lights: bool = true;
+// More than one instance: else there is one, that of what never moves, in world space.
+override scene_has_instances: bool = true;
+// Anything that is not where it was in the previous frame: else that frame's scene is this one's.
+override scene_has_motion: bool = true;
+// More triangles than one storage binding holds.
+override scene_has_many_triangles: bool = true;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> nodes: array<BvhNode>;
 @group(0) @binding(2) var<storage, read> triangles: array<Triangle>;
-@group(0) @binding(3) var<storage, read> materials: array<Material>;
+@group(0) @binding(3) var<storage, read> triangles_rest: array<Triangle>;
 @group(0) @binding(4) var<storage, read> lights: array<Light>;
-@group(0) @binding(5) var atlas: texture_2d_array<f32>;
-@group(0) @binding(6) var environment_radiance: texture_2d<f32>;
-@group(0) @binding(7) var environment_alias: texture_2d<u32>;
+@group(0) @binding(5) var attributes: texture_2d<u32>;
+@group(0) @binding(6) var materials: texture_2d<u32>;
+@group(0) @binding(7) var instances: texture_2d<u32>;
+@group(0) @binding(8) var atlas: texture_2d_array<f32>;
+@group(0) @binding(9) var environment_radiance: texture_2d<f32>;
+@group(0) @binding(10) var environment_alias: texture_2d<u32>;

@@ -43,8 +43,8 @@ fn light_sample(rng: ptr<function, Rng>) -> LightSample {
     return LightSample(light, pack_cell(bits.zw >> vec2u(16u)));
 }
 
-fn triangle_area(triangle: u32) -> f32 {
-    return 0.5 * length(triangle_normal(triangle));
+fn triangle_area(instance: u32, triangle: u32) -> f32 {
+    return 0.5 * length(triangle_normal(instance, triangle));
 }
 
 // Density of `light_sample` in the sample's own measure.
@@ -52,7 +52,7 @@ fn light_sample_pdf(sample: LightSample) -> f32 {
     let pmf = lights[sample.light].pmf;
     let kind = lights[sample.light].kind;
     if kind == LIGHT_TRIANGLE {
-        let area = triangle_area(lights[sample.light].triangle);
+        let area = triangle_area(lights[sample.light].instance, lights[sample.light].triangle);
         // Also 0 where the area is 0 in f32, or the density too large for it.
         return select(0.0, pmf / area, area > 1e-30);
     }
@@ -63,8 +63,8 @@ fn light_sample_pdf(sample: LightSample) -> f32 {
 }
 
 // Density per solid angle with which `light_sample` would have drawn the hit that a BRDF ray made on light `light`.
-fn light_hit_pdf(light: u32, triangle: u32, direction: vec3f, distance: f32) -> f32 {
-    let scaled_normal = triangle_normal(triangle);
+fn light_hit_pdf(light: u32, instance: u32, triangle: u32, direction: vec3f, distance: f32) -> f32 {
+    let scaled_normal = triangle_normal(instance, triangle);
     let cosine_times_twice_area = abs(dot(scaled_normal, direction));
     if cosine_times_twice_area <= 0.0 {
         return 0.0;
@@ -96,34 +96,54 @@ fn cone_attenuation(light: u32, direction: vec3f) -> f32 {
 
 // How far from the plane of a light triangle a shadow ray must end so that the light does not shadow itself: a few ulps
 // of the largest coordinate in the test of the ray against the triangle.
-fn shadow_margin(triangle: u32, position: vec3f) -> f32 {
-    let corners = max(max(abs(triangles[triangle].p0), abs(triangles[triangle].p1)), abs(triangles[triangle].p2));
-    let largest = max(corners, abs(position));
+fn shadow_margin(instance: u32, triangle: u32, position: vec3f) -> f32 {
+    let corners = triangle_corners(instance, triangle);
+    let largest = max(max(max(abs(corners.p0), abs(corners.p1)), abs(corners.p2)), abs(position));
     return 2e-6 * max(largest.x, max(largest.y, largest.z));
 }
 
-// What a light sample sends to a point, unshadowed. `previous` asks for the light as it was in the previous frame.
+// By how much the area of an emissive triangle has grown since the previous frame. A sample's point is kept in barycentrics,
+// so that this is the Jacobian of taking it from that frame to this one; 1 for other lights.
+fn light_growth(light: u32) -> f32 {
+    if !scene_has_motion || !scene_has_instances || lights[light].kind != LIGHT_TRIANGLE {
+        return 1.0;
+    }
+    let triangle = lights[light].triangle;
+    let instance = lights[light].instance;
+    let before = triangle_area(previous_instance(instance), previous_triangle(instance, triangle));
+    return select(0.0, triangle_area(instance, triangle) / before, before > 1e-30);
+}
+
+// What a light sample sends to a point, unshadowed. `previous` asks for the light as it was in the previous frame; the
+// measure stays this frame's.
 fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> LightContribution {
     let light = sample.light;
     let kind = lights[light].kind;
     if kind == LIGHT_TRIANGLE {
-        let triangle = lights[light].triangle;
+        var triangle = lights[light].triangle;
+        var instance = lights[light].instance;
+        var growth = 1.0;
+        if previous {
+            growth = light_growth(light);
+            triangle = previous_triangle(instance, triangle);
+            instance = previous_instance(instance);
+        }
         let uv = light_sample_barycentrics(sample);
-        let to_light = triangle_point(triangle, uv) - position;
+        let to_light = triangle_point(instance, triangle, uv) - position;
         let distance_2 = dot(to_light, to_light);
         let distance = sqrt(distance_2);
         let direction = to_light / max(distance, 1e-20);
-        let scaled_normal = triangle_normal(triangle);
+        let scaled_normal = triangle_normal(instance, triangle);
         var cosine = dot(scaled_normal, -direction) / length(scaled_normal);
-        if (triangles[triangle].flags & TRIANGLE_DOUBLE_SIDED) != 0u {
+        if (load_triangle(triangle).flags & TRIANGLE_DOUBLE_SIDED) != 0u {
             cosine = abs(cosine);
         }
         // Not `cosine <= 0`, which is false for the 0 / 0 of a triangle without area.
-        if !(cosine > 0.0) || distance_2 <= 1e-12 {
+        if !(cosine > 0.0) || distance_2 <= 1e-12 || growth <= 0.0 {
             return LightContribution(direction, distance, vec3f(0.0), 0.0);
         }
-        let free = max(distance - shadow_margin(triangle, position) / cosine, 0.0);
-        return LightContribution(direction, free, emitted_radiance(triangle, uv) * (cosine / distance_2),
+        let free = max(distance - shadow_margin(instance, triangle, position) / cosine, 0.0);
+        return LightContribution(direction, free, emitted_radiance(triangle, uv) * (cosine / distance_2 / growth),
             distance_2 / cosine);
     }
     if scene_has_environment && kind == LIGHT_ENVIRONMENT {
@@ -133,10 +153,11 @@ fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> L
     if !scene_has_punctual_lights {
         return LightContribution(vec3f(0.0, 1.0, 0.0), 0.0, vec3f(0.0), 0.0);
     }
+    let punctual = select(light, lights[light].previous, previous && scene_has_motion);
     if kind == LIGHT_DIRECTIONAL {
-        return LightContribution(-lights[light].direction, ENVIRONMENT_DISTANCE, lights[light].intensity, 0.0);
+        return LightContribution(-lights[punctual].direction, ENVIRONMENT_DISTANCE, lights[light].intensity, 0.0);
     }
-    let to_light = select(lights[light].position, lights[light].previous_position, previous) - position;
+    let to_light = lights[punctual].position - position;
     let distance = length(to_light);
     let direction = to_light / max(distance, 1e-20);
     if distance <= 1e-6 {
@@ -145,7 +166,7 @@ fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> L
     }
     var attenuation = distance_attenuation(light, distance);
     if kind == LIGHT_SPOT {
-        attenuation *= cone_attenuation(light, direction);
+        attenuation *= cone_attenuation(punctual, direction);
     }
     return LightContribution(direction, distance, lights[light].intensity * attenuation, 0.0);
 }

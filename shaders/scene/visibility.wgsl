@@ -12,7 +12,7 @@ fn trace_pixel(pixel: vec2u) {
     let hit = traverse(ray.origin, ray.direction, 3.0e38, false);
     var result = vec4u(NONE);
     if hit.triangle != NONE {
-        result = vec4u(triangles[hit.triangle].instance, hit.triangle, bitcast<vec2u>(hit.uv));
+        result = vec4u(hit.instance, hit.triangle, bitcast<vec2u>(hit.uv));
     }
     textureStore(visibility_out, pixel, result);
 }

@@ -13,5 +13,5 @@ fn pixel_has_surface(pixel: vec2u) -> bool {
 fn load_pixel(pixel: vec2u) -> Surface {
     let v = textureLoad(visibility, pixel, 0);
     let uv = bitcast<vec2f>(v.zw);
-    return load_surface(v.y, uv, direction_to_camera(frame.camera, triangle_point(v.y, uv)));
+    return load_surface(v.x, v.y, uv, direction_to_camera(frame.camera, triangle_point(v.x, v.y, uv)));
 }

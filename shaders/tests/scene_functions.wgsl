@@ -21,7 +21,7 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
     let b = float(input.b);
     switch operation {
         case TEXTURE_READ: {
-            return TestOutput(bits(texture_read(materials[input.b.x].base_color_texture, a)), vec4u(0u));
+            return TestOutput(bits(texture_read(load_material(input.b.x).base_color_texture, a)), vec4u(0u));
         }
         case LIGHT_SAMPLE: {
             var rng = rng_new(input.a.xy, 0u, input.a.z, 0u);
@@ -38,9 +38,10 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
             let sample = LightSample(input.b.x, input.b.y);
             let light = light_contribution(sample, a.xyz, false);
             let triangle = lights[sample.light].triangle;
-            let distance = length(triangle_point(triangle, light_sample_barycentrics(sample)) - a.xyz);
+            let instance = lights[sample.light].instance;
+            let distance = length(triangle_point(instance, triangle, light_sample_barycentrics(sample)) - a.xyz);
             return TestOutput(bits(vec4f(light_sample_pdf(sample) * light.solid_angle_jacobian,
-                light_hit_pdf(sample.light, triangle, light.direction, distance), 0.0, 0.0)), vec4u(0u));
+                light_hit_pdf(sample.light, instance, triangle, light.direction, distance), 0.0, 0.0)), vec4u(0u));
         }
         case ENVIRONMENT: {
             return TestOutput(bits_3(environment_evaluate(a.xyz), environment_pdf(a.xyz)),

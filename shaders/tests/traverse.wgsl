@@ -1,6 +1,6 @@
 // Ray queries, for tests against the CPU.
 // One invocation: one ray (a: origin and t_max, b: direction, c.x: any hit). Reads the scene. Writes (t, triangle,
-// barycentrics).
+// barycentrics) and the instance.
 #include "tests/harness.wgsl"
 #include "scene/bvh.wgsl"
 
@@ -13,5 +13,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let a = float(input.a);
     let hit = traverse(a.xyz, float(input.b).xyz, a.w, input.c.x == 1u);
     test_outputs[id.x] = TestOutput(
-        vec4u(bitcast<u32>(hit.t), hit.triangle, bitcast<u32>(hit.uv.x), bitcast<u32>(hit.uv.y)), vec4u(0u));
+        vec4u(bitcast<u32>(hit.t), hit.triangle, bitcast<u32>(hit.uv.x), bitcast<u32>(hit.uv.y)), vec4u(hit.instance, 0u, 0u, 0u));
 }

@@ -1,5 +1,6 @@
 //! The device: adapter and limits, device loss, pipelines, buffers, textures and read-back.
 
+pub mod data_texture;
 pub mod readback;
 pub mod recorder;
 #[cfg(all(debug_assertions, not(target_arch = "wasm32")))]

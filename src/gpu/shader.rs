@@ -54,33 +54,48 @@ pub mod table {
     include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 }
 
-/// What a scene has: kernels leave out the code for what it has not.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct SceneFeatures {
-    /// Any texture.
-    pub textures: bool,
-    /// Any triangle whose alpha has to be tested.
-    pub alpha_masks: bool,
-    /// An environment.
-    pub environment: bool,
-    /// Any point, spot or directional light.
-    pub punctual_lights: bool,
+/// Declares the features once: the struct, its extremes, and the WGSL `override` (`scene_has_NAME`) of each.
+macro_rules! scene_features {
+    ($($(#[$meta:meta])* $name:ident,)*) => {
+        /// What a scene has: kernels leave out the code for what it has not.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub struct SceneFeatures { $($(#[$meta])* pub $name: bool,)* }
+
+        impl SceneFeatures {
+            /// Everything: right for every scene, fast for few.
+            pub const ALL: Self = SceneFeatures { $($name: true,)* };
+            /// Nothing: single-sided triangles that shine evenly.
+            pub const NONE: Self = SceneFeatures { $($name: false,)* };
+
+            /// The names of the `override` declarations.
+            pub const OVERRIDES: &[&str] = &[$(concat!("scene_has_", stringify!($name)),)*];
+
+            /// The value of the shader's `override` of this name.
+            fn has(self, name: &str) -> bool {
+                match name {
+                    $(concat!("scene_has_", stringify!($name)) => self.$name,)*
+                    _ => true,
+                }
+            }
+        }
+    };
 }
 
-impl SceneFeatures {
-    /// Everything: right for every scene, fast for few.
-    pub const ALL: Self = SceneFeatures { textures: true, alpha_masks: true, environment: true, punctual_lights: true };
-
-    /// The value of the shader's `override` of this name.
-    fn has(self, name: &str) -> bool {
-        match name {
-            "scene_has_textures" => self.textures,
-            "scene_has_alpha_masks" => self.alpha_masks,
-            "scene_has_environment" => self.environment,
-            "scene_has_punctual_lights" => self.punctual_lights,
-            _ => true,
-        }
-    }
+scene_features! {
+    /// Any texture.
+    textures,
+    /// Any triangle whose alpha has to be tested.
+    alpha_masks,
+    /// An environment.
+    environment,
+    /// Any point, spot or directional light.
+    punctual_lights,
+    /// A top level: more than one mesh that is in world space already.
+    instances,
+    /// Anything that moves.
+    motion,
+    /// More triangles than one storage binding holds.
+    many_triangles,
 }
 
 /// A pipeline and the layouts its bind groups are made with.

@@ -1,13 +1,17 @@
 //! The flattened BVH: built by obvhs, laid out for traversal.
 
 use super::gpu_types::{BvhNode, Triangle};
+use glam::Vec3;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, leaf_collapser::collapse, reinsertion::ReinsertionOptimizer};
 use obvhs::ploc::morton::morton_encode_u128_unorm;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
-/// No path from the root is longer than this, in nodes: the size of the traversal's stack (`shaders/scene/bvh.wgsl`).
+/// No path from the root is longer than this, in nodes. With [`MAX_TOP_DEPTH`] the size of the traversal's
+/// stack (`shaders/scene/bvh.wgsl`).
 pub const MAX_DEPTH: u32 = 60;
+/// No path of a top level is longer than this, in nodes: more than log2 of the instances there can be.
+pub const MAX_TOP_DEPTH: u32 = 24;
 /// Most triangles in a leaf.
 pub const MAX_LEAF: u32 = 4;
 
@@ -35,7 +39,43 @@ pub fn build(triangles: &[Triangle]) -> Bvh {
             return clustered;
         }
     }
-    halve(&boxes)
+    halve(&boxes, MAX_LEAF)
+}
+
+/// Builds a top level over boxes (low and high corner; at least one): leaves hold one box each, `first` is its index.
+pub fn build_top(boxes: &[[Vec3; 2]]) -> Vec<BvhNode> {
+    let boxes: Vec<Aabb> = boxes.iter().map(|&[min, max]| Aabb::new(min.into(), max.into())).collect();
+    let mut bvh = halve(&boxes, 1);
+    if clusters_quickly(&boxes) {
+        let clustered = layout(&run_ploc(&mut PlocBuilder::with_capacity(boxes.len()), &boxes));
+        if clustered.depth <= MAX_TOP_DEPTH {
+            bvh = clustered;
+        }
+    }
+    for node in bvh.nodes.iter_mut().filter(|node| node.count != 0) {
+        node.first = bvh.order[node.first as usize];
+    }
+    bvh.nodes
+}
+
+/// Makes the boxes of `nodes` fit `triangles` again, after those have moved; the tree stays. Nodes and triangles count from
+/// the bottom level's own first, and children stand after their parent.
+pub fn refit(nodes: &mut [BvhNode], triangles: &[Triangle]) {
+    for i in (0..nodes.len()).rev() {
+        let BvhNode { first, count, .. } = nodes[i];
+        let first = first as usize;
+        let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        if count == 0 {
+            for child in nodes.get(first..first + 2).unwrap_or_default() {
+                (min, max) = (min.min(child.min), max.max(child.max));
+            }
+        } else {
+            for t in triangles.get(first..first + count as usize).unwrap_or_default() {
+                (min, max) = (min.min(t.p0).min(t.p1).min(t.p2), max.max(t.p0).max(t.p1).max(t.p2));
+            }
+        }
+        (nodes[i].min, nodes[i].max) = (min, max);
+    }
 }
 
 /// SAH cost for a ray that hits the root's box: 1 for a node tested, 1 for a triangle tested.
@@ -115,7 +155,7 @@ fn clusters_quickly(boxes: &[Aabb]) -> bool {
 }
 
 /// Splits at the median along the longest axis of the centers until a leaf is full: depth log2(n), whatever the shape.
-fn halve(boxes: &[Aabb]) -> Bvh {
+fn halve(boxes: &[Aabb], max_leaf: u32) -> Bvh {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
     let mut nodes: Vec<BvhNode> = vec![bytemuck::Zeroable::zeroed()];
     let mut deepest = 0;
@@ -131,7 +171,7 @@ fn halve(boxes: &[Aabb]) -> Bvh {
             centers.extend(center(i));
         }
         let (min, max) = (bounds.min.into(), bounds.max.into());
-        nodes[target] = if part.len() <= MAX_LEAF as usize {
+        nodes[target] = if part.len() <= max_leaf as usize {
             BvhNode { min, first: range.start as u32, max, count: part.len() as u32 }
         } else {
             let axis = centers.diagonal().max_position();
@@ -181,7 +221,7 @@ fn layout(bvh: &Bvh2) -> Bvh {
 mod tests {
     use super::*;
     use crate::scene::random::Random;
-    use glam::{UVec3, Vec3};
+    use glam::UVec3;
     use std::f32::consts::{PI, TAU};
     use std::time::{Duration, Instant};
 
@@ -254,14 +294,14 @@ mod tests {
     fn halves_hold_their_contents() {
         for count in [1, 4, 5, 100, 5000] {
             let triangles = soup(count, 7);
-            check(&halve(&boxes_of(&triangles)), &triangles);
+            check(&halve(&boxes_of(&triangles), MAX_LEAF), &triangles);
         }
     }
 
     #[test]
     fn a_clustered_soup_is_better_than_halves() {
         let triangles = soup(5000, 3);
-        let (built, halves) = (cost(&build(&triangles).nodes), cost(&halve(&boxes_of(&triangles)).nodes));
+        let (built, halves) = (cost(&build(&triangles).nodes), cost(&halve(&boxes_of(&triangles), MAX_LEAF).nodes));
         assert!(built < 0.9 * halves, "{built} {halves}");
     }
 
@@ -336,7 +376,7 @@ mod tests {
             assert!(clusters_quickly(&boxes_of(&triangles)), "{name}");
             let bvh = checked(&triangles);
             assert!(start.elapsed() < Duration::from_secs(3), "{name}: {:?}", start.elapsed());
-            let halves = cost(&halve(&boxes_of(&triangles)).nodes);
+            let halves = cost(&halve(&boxes_of(&triangles), MAX_LEAF).nodes);
             assert!(cost(&bvh.nodes) < halves, "{name}: {} {halves}", cost(&bvh.nodes));
         }
     }

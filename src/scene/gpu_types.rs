@@ -57,25 +57,32 @@ pub const TRIANGLE_DOUBLE_SIDED: u32 = 1;
 pub const TRIANGLE_ALPHA_MASK: u32 = 2;
 /// [`Triangle::flags`]: the corners have tangents.
 pub const TRIANGLE_TANGENTS: u32 = 4;
-/// [`Triangle::flags`]: the bitangent of corner i is negative if bit `TRIANGLE_BITANGENT_SHIFT + i` is set.
-pub const TRIANGLE_BITANGENT_SHIFT: u32 = 3;
 
 gpu_struct! {
-/// One triangle in world space with everything a hit needs: 128 bytes. Wound so that `cross(p1 - p0, p2 - p0)` points
-/// out of the front.
+/// What traversal reads of one triangle: 48 bytes, in the space of its bottom-level mesh. Wound so that
+/// `cross(p1 - p0, p2 - p0)` points out of the front.
 pub struct Triangle {
     /// First corner.
     pub p0: Vec3,
-    /// Index of the material.
-    pub material: u32,
+    /// `TRIANGLE_*` bits.
+    pub flags: u32,
     /// Second corner.
     pub p1: Vec3,
-    /// Index of the light this triangle is, or [`NONE`].
-    pub light: u32,
+    /// Index of the material.
+    pub material: u32,
     /// Third corner.
     pub p2: Vec3,
-    /// Index of the instance it came from.
-    pub instance: u32,
+    /// Which of its instance's lights this triangle is ([`Instance::first_light`] is number 0), or [`NONE`].
+    pub light: u32,
+}
+}
+
+/// [`TriangleAttributes::tangent_2`]: the bitangent of corner i is negative if bit `BITANGENT_SHIFT + i` is set.
+pub const BITANGENT_SHIFT: u32 = 16;
+
+gpu_struct! {
+/// What shading reads of one triangle besides its [`Triangle`]: 80 bytes, five texels of the data texture `attributes`.
+pub struct TriangleAttributes {
     /// UV set 0 of the corners 0 (xy) and 1 (zw).
     pub uv_a: Vec4,
     /// UV set 0 of corner 2 (xy), UV set 1 of corner 0 (zw).
@@ -83,22 +90,36 @@ pub struct Triangle {
     /// UV set 1 of the corners 1 (xy) and 2 (zw).
     pub uv_c: Vec4,
     /// Shading normals of the corners, octahedral, 2 x 16 bit snorm.
-    pub normal_0: u32,
-    /// Shading normal of corner 1.
-    pub normal_1: u32,
-    /// Shading normal of corner 2.
-    pub normal_2: u32,
+    pub normals: [u32; 3],
     /// Tangent angles of the corners 0 (low half) and 1 (high half): 65536 steps a turn, in the frame that
     /// `orthonormal_basis` builds round the corner's decoded normal.
-    pub tangents: u32,
+    pub tangents_01: u32,
     /// Linear vertex colours of the corners, RGBA8 unorm; white is `0xffffffff`.
-    pub color_0: u32,
-    /// Colour of corner 1.
-    pub color_1: u32,
-    /// Colour of corner 2.
-    pub color_2: u32,
-    /// Low half: `TRIANGLE_*` bits. High half: tangent angle of corner 2.
-    pub flags: u32,
+    pub colors: [u32; 3],
+    /// Low half: tangent angle of corner 2. From bit `BITANGENT_SHIFT` on: signs of the bitangents.
+    pub tangent_2: u32,
+}
+}
+
+gpu_struct! {
+/// A bottom-level mesh placed in the world: 112 bytes, seven texels of the data texture `instances`. In a scene that moves
+/// each has a twin, as many places after it as there are instances: the same as it was in the previous frame.
+///
+/// The rows of a matrix M are such that component i of `M p` is `dot(row_i, (p, 1))`.
+pub struct Instance {
+    /// World to object.
+    pub to_object: [Vec4; 3],
+    /// Object to world.
+    pub to_world: [Vec4; 3],
+    /// Index of the bottom level's root in `nodes`.
+    pub root: u32,
+    /// Index in `lights` of the first of its emissive triangles.
+    pub first_light: u32,
+    /// What to add, modulo 2^32, to a triangle's index for the triangle as it was in the previous frame; 0 where the mesh
+    /// does not change its shape.
+    pub previous_triangles: u32,
+    /// Unused.
+    pub padding: u32,
 }
 }
 
@@ -125,7 +146,8 @@ pub struct TextureSlot {
 }
 
 gpu_struct! {
-/// glTF metallic-roughness material: 240 bytes.
+/// glTF metallic-roughness material: 240 bytes, fifteen texels of the data texture `materials`, read by
+/// `load_material`.
 pub struct Material {
     /// Linear base colour and alpha.
     pub base_color: Vec4,
@@ -164,16 +186,13 @@ pub const LIGHT_DIRECTIONAL: u32 = 3;
 pub const LIGHT_ENVIRONMENT: u32 = 4;
 
 gpu_struct! {
-/// One light with its entry in the alias table: 96 bytes.
+/// One light with its entry in the alias table: 80 bytes. In a scene that moves each punctual light has a twin after all
+/// lights: the same as it was in the previous frame.
 pub struct Light {
     /// World position of a point or spot light.
     pub position: Vec3,
     /// `LIGHT_*`.
     pub kind: u32,
-    /// Where it was in the previous frame.
-    pub previous_position: Vec3,
-    /// Index of the triangle of an emissive triangle.
-    pub triangle: u32,
     /// Unit direction in which a spot or directional light shines.
     pub direction: Vec3,
     /// Range in metres; 0 for unlimited.
@@ -190,6 +209,14 @@ pub struct Light {
     pub alias_threshold: f32,
     /// Alias table: the other light of this bucket.
     pub alias_light: u32,
+    /// Index of the triangle of an emissive triangle.
+    pub triangle: u32,
+    /// Index of the instance of an emissive triangle.
+    pub instance: u32,
+    /// Index of this light as it was in the previous frame: its twin, or itself. Not read of emissive triangles.
+    pub previous: u32,
+    /// Unused.
+    pub padding: u32,
 }
 }
 

@@ -15,31 +15,57 @@ pub struct Hit {
     pub u: f32,
     /// Barycentric weight of corner 2.
     pub v: f32,
+    /// Index of the instance.
+    pub instance: u32,
 }
 
-/// The closest hit with 0 < t < `t_max`. Backs of single-sided triangles are missed; alpha is not tested.
+/// The closest hit with 0 < t < `t_max`, at rest. Backs of single-sided triangles are missed; alpha is not tested.
 pub fn intersect_cpu(scene: &FlatScene, origin: Vec3, direction: Vec3, t_max: f32) -> Option<Hit> {
+    let mut closest: Option<Hit> = None;
+    let limit = |closest: &Option<Hit>| closest.map_or(t_max, |hit| hit.t);
+    let bottom = |closest: &mut Option<Hit>, instance: u32| {
+        let Some(placed) = scene.instances.get(instance as usize) else { return };
+        let Some(mesh) = scene.meshes.get(placed.mesh as usize) else { return };
+        let to_object = placed.transform.inverse();
+        let (origin, direction) = (to_object.transform_point3(origin), to_object.transform_vector3(direction));
+        walk(&scene.nodes, mesh.root, origin, direction, closest, limit, &mut |i, closest| {
+            let triangle = scene.triangles.get(i as usize);
+            let hit = triangle.and_then(|t| intersect_triangle(t, origin, direction, limit(closest)));
+            if let Some((t, u, v)) = hit {
+                *closest = Some(Hit { t, triangle: i, u, v, instance });
+            }
+        });
+    };
+    if scene.has_top_level() {
+        walk(&scene.nodes, scene.root(), origin, direction, &mut closest, limit, &mut |i, closest| bottom(closest, i));
+    } else {
+        bottom(&mut closest, 0);
+    }
+    closest
+}
+
+/// Calls `leaf` for everything in the leaves below `root` whose boxes the ray meets.
+fn walk(
+    nodes: &[BvhNode],
+    root: u32,
+    origin: Vec3,
+    direction: Vec3,
+    closest: &mut Option<Hit>,
+    limit: impl Fn(&Option<Hit>) -> f32,
+    leaf: &mut dyn FnMut(u32, &mut Option<Hit>),
+) {
     let safe = |d: f32| if d.abs() < 1e-20 { 1e-20 } else { d };
     let inverse = Vec3::from_array(direction.to_array().map(safe)).recip();
-    let mut limit = t_max;
-    let mut closest = None;
-    let mut pending = vec![0u32];
-    while let Some(node) = pending.pop().and_then(|i| scene.nodes.get(i as usize)) {
-        if !hits_box(node, origin, inverse, limit) {
+    let mut pending = vec![root];
+    while let Some(node) = pending.pop().and_then(|i| nodes.get(i as usize)) {
+        if !hits_box(node, origin, inverse, limit(closest)) {
             continue;
         }
         if node.count == 0 {
             pending.extend([node.first + 1, node.first]);
         }
-        for i in node.first..node.first + node.count {
-            let hit = scene.triangles.get(i as usize).and_then(|t| intersect_triangle(t, origin, direction, limit));
-            if let Some((t, u, v)) = hit {
-                limit = t;
-                closest = Some(Hit { t, triangle: i, u, v });
-            }
-        }
+        (node.first..node.first + node.count).for_each(|i| leaf(i, closest));
     }
-    closest
 }
 
 /// Möller and Trumbore 1997: (t, u, v) if 0 < t < `t_max`.

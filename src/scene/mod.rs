@@ -18,6 +18,7 @@ pub mod octahedral;
 pub mod random;
 pub mod rig;
 pub mod shapes;
+pub mod stage;
 pub mod tangents;
 
 pub use flat::FlatScene;

@@ -3,13 +3,14 @@
 //! The frame before is a whole scene of its own, with transforms, shapes, lights and both levels of its BVH, so that
 //! temporal reuse can rebuild and trace it exactly.
 
+use super::flat::FlatScene;
 use super::flat::deformers::{Deformer, write_shape};
-use super::flat::{FlatScene, levels};
 use super::gpu_types::{BvhNode, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, NONE, Triangle, TriangleAttributes};
 use super::rig::Pose;
 use super::rig::deform::Deformed;
 use super::{Camera, bvh};
 use glam::{Mat4, Vec3};
+use std::ops::Range;
 
 /// A bottom level is built again once rays through it are expected to cost this many times what they did when it was
 /// built (by the surface-area heuristic), for refitting keeps its tree and only moves the boxes.
@@ -33,6 +34,7 @@ pub struct Stage {
     pub bodies: Vec<Body>,
     /// Whether anything is not where it was in the frame before.
     moved: bool,
+    version: u64,
 }
 
 /// A mesh that changes its shape.
@@ -52,14 +54,13 @@ pub struct Body {
     /// Expected cost of a ray when the bottom level was built.
     built_cost: f32,
     emits: bool,
+    capacity: usize,
 }
 
 impl Stage {
     /// Everything of `scene` as it is at `time` of animation `clip`; the frame before is the same.
     pub fn new(scene: &FlatScene, clip: usize, time: f64) -> Self {
-        let first = scene.first_punctual as usize;
-        let punctual = |light: &&Light| (LIGHT_POINT..=LIGHT_DIRECTIONAL).contains(&light.kind);
-        let lights: Vec<Light> = scene.lights.iter().skip(first).take_while(punctual).copied().collect();
+        let lights = scene.lights.get(Stage::punctual(scene)).unwrap_or_default().to_vec();
         let transforms: Vec<Mat4> = scene.instances.iter().map(|instance| instance.transform).collect();
         let bodies = scene.deformers.list.iter().map(|deformer| Body::new(scene, deformer)).collect();
         let mut stage = Stage {
@@ -72,6 +73,7 @@ impl Stage {
             lights,
             bodies,
             moved: false,
+            version: 0,
         };
         stage.take(scene, clip, time);
         stage.rest();
@@ -96,6 +98,18 @@ impl Stage {
         self.moved = true;
     }
 
+    /// The punctual lights among those of a scene.
+    pub fn punctual(scene: &FlatScene) -> Range<usize> {
+        let first = (scene.first_punctual as usize).min(scene.lights.len());
+        let is_punctual = |light: &&Light| (LIGHT_POINT..=LIGHT_DIRECTIONAL).contains(&light.kind);
+        first..first + scene.lights[first..].iter().take_while(is_punctual).count()
+    }
+
+    /// Another number whenever anything has been moved.
+    pub fn version(&self) -> u64 {
+        self.version
+    }
+
     /// Whether anything is not where it was in the frame before.
     pub fn has_moved(&self) -> bool {
         self.moved
@@ -116,6 +130,7 @@ impl Stage {
 
     fn take(&mut self, scene: &FlatScene, clip: usize, time: f64) {
         (self.clip, self.time) = (clip, time);
+        self.version += 1;
         self.pose = scene.rig.pose(clip, time);
         for placement in &scene.rig.instances {
             if let Some(transform) = self.transforms.get_mut(placement.instance as usize) {
@@ -160,10 +175,21 @@ impl Body {
             attributes: scene.attributes[triangles.clone()].to_vec(),
             corners: scene.deformers.corners_of(deformer, mesh.triangles).to_vec(),
             built_cost: bvh::cost(&nodes),
+            capacity: Body::node_capacity(nodes.len()),
             nodes,
             rebuilt: false,
             emits: scene.triangles[triangles].iter().any(|triangle| triangle.light != NONE),
         }
+    }
+
+    /// Most nodes that a bottom level may have when it is built again, if it had `nodes` at first.
+    pub fn node_capacity(nodes: usize) -> usize {
+        nodes + nodes / 4 + 2
+    }
+
+    /// Whether any of its triangles is a light.
+    pub fn emits(&self) -> bool {
+        self.emits
     }
 
     /// The box of everything.
@@ -181,6 +207,11 @@ impl Body {
             return;
         }
         let rebuilt = bvh::build(&self.triangles);
+        if rebuilt.nodes.len() > self.capacity {
+            // There is no room for it: what was refitted is as good as it gets for a while.
+            self.built_cost = bvh::cost(&self.nodes);
+            return;
+        }
         self.built_cost = bvh::cost(&rebuilt.nodes);
         self.nodes = rebuilt.nodes;
         self.triangles = permuted(&self.triangles, &rebuilt.order);

@@ -150,6 +150,7 @@ pub fn frame_of(scene: &FlatScene, camera: &Camera) -> frame::Frame {
         max_depth: 1,
         light_count: scene.lights.len() as u32,
         environment_light: environment_light(scene),
+        top_level: scene.root(),
         scene_radius: 1.0,
         ..bytemuck::Zeroable::zeroed()
     }

@@ -4,6 +4,7 @@
 pub mod animated;
 pub mod gltf_writer;
 pub mod harness;
+pub mod plants;
 pub mod statistics;
 pub mod twins;
 

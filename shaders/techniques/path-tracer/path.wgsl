@@ -33,7 +33,7 @@ fn weighted_emission(surface: Surface, direction: vec3f, distance: f32, brdf_pdf
     if surface.light == NONE {
         return vec3f(0.0);
     }
-    let pdf = light_hit_pdf(surface.light, surface.triangle, direction, distance);
+    let pdf = light_hit_pdf(surface.light, surface.instance, surface.triangle, direction, distance);
     return surface.emission * mis_weight(frame.mis_heuristic, brdf_pdf, pdf);
 }
 
@@ -82,7 +82,7 @@ fn scattered_radiance(start: Surface, direct: bool, rng: ptr<function, Rng>) -> 
             }
             break;
         }
-        surface = load_surface(hit.triangle, hit.uv, -wi);
+        surface = load_surface(hit.instance, hit.triangle, hit.uv, -wi);
         if counts {
             radiance += throughput * weighted_emission(surface, wi, hit.t, pdf);
         }

@@ -6,6 +6,7 @@ use crate::session::{Options, PassReport, Session};
 use crate::{progress, report};
 use pollster::block_on;
 use restir::output::{ExrPicture, check_writable, encode_exr, write_atomic, write_png};
+use restir::renderer::Auxiliary;
 use restir::scene::flat::SceneStats;
 use std::time::Instant;
 
@@ -106,7 +107,7 @@ pub fn run(args: &Args) -> Result<()> {
     };
     let seconds = start.elapsed().as_secs_f64();
     if args.animate.is_none() {
-        write(&mut session, args, &args.out, frames)?;
+        write(&mut session, args, &args.out, None, frames)?;
     }
 
     let counters = block_on(session.renderer.counters())?;
@@ -198,17 +199,22 @@ fn animate(session: &mut Session, args: &Args, rate: f64) -> Result<u32> {
     let bar = progress::bar(pictures.into()).with_message("pictures");
     for picture in 0..pictures {
         session.renderer.set_time(args.options.time + f64::from(picture) / rate);
-        for _ in 0..samples {
+        let mut auxiliary = None;
+        for sample in 0..samples {
             session.measured_frame()?;
+            // Motion is that from picture to picture: the later samples have seen nothing move.
+            if sample == 0 && args.out.format == Format::Exr {
+                auxiliary = Some(block_on(session.renderer.read_auxiliary())?);
+            }
         }
-        write(session, args, &args.out.numbered(picture, pictures), samples)?;
+        write(session, args, &args.out.numbered(picture, pictures), auxiliary, samples)?;
         bar.set_position(u64::from(picture) + 1);
     }
     bar.finish_and_clear();
     Ok(pictures.saturating_mul(samples))
 }
 
-fn write(session: &mut Session, args: &Args, file: &OutFile, frames: u32) -> Result<()> {
+fn write(session: &mut Session, args: &Args, file: &OutFile, auxiliary: Option<Auxiliary>, frames: u32) -> Result<()> {
     let renderer = &mut session.renderer;
     let OutFile { path, format } = file;
     match format {
@@ -217,12 +223,14 @@ fn write(session: &mut Session, args: &Args, file: &OutFile, frames: u32) -> Res
             write_png(path, size.x, size.y, &block_on(renderer.read_display())?)?;
         }
         Format::Exr => {
-            let (image, auxiliary) = (block_on(renderer.read_image())?, block_on(renderer.read_auxiliary())?);
+            let image = block_on(renderer.read_image())?;
+            let auxiliary = auxiliary.map_or_else(|| block_on(renderer.read_auxiliary()), Ok)?;
             let picture = ExrPicture {
                 image: &image,
                 albedo: Some(&auxiliary.albedo),
                 normal: Some(&auxiliary.normal),
                 depth: Some(&auxiliary.depth),
+                motion: Some(&auxiliary.motion),
                 technique: &args.options.technique,
                 parameters: &renderer.parameters().to_string(),
                 seed: args.options.seed,

@@ -3,7 +3,7 @@
 //! `RSTR`, version, length of the header (u32 each), 0; the header as JSON; then the arrays in the order of [`Sections`],
 //! each beginning at a multiple of 16. Little-endian throughout.
 
-use super::{Atlas, FlatEnvironment, FlatScene, SceneStats, validate};
+use super::{Atlas, Deformers, FlatEnvironment, FlatScene, SceneStats, validate};
 use crate::error::{Error, Result};
 use crate::scene::rig::bytes as rig_bytes;
 use crate::scene::{Camera, Projection, Rig};
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 const _: () = assert!(cfg!(target_endian = "little"), "arrays are copied as they lie in memory");
 
 const MAGIC: [u8; 4] = *b"RSTR";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const PREFIX: usize = 16;
 const ALIGNMENT: usize = 16;
 
@@ -39,10 +39,17 @@ struct Header {
 struct Sections {
     nodes: usize,
     triangles: usize,
+    attributes: usize,
+    meshes: usize,
+    instances: usize,
     materials: usize,
     lights: usize,
     atlas_texels: usize,
     environment_texels: usize,
+    deformers: usize,
+    deformer_vertices: usize,
+    displacements: usize,
+    corners: usize,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -73,6 +80,9 @@ impl FlatScene {
         };
         section(bytemuck::cast_slice(&self.nodes));
         section(bytemuck::cast_slice(&self.triangles));
+        section(bytemuck::cast_slice(&self.attributes));
+        section(bytemuck::cast_slice(&self.meshes));
+        section(bytemuck::cast_slice(&self.instances));
         section(bytemuck::cast_slice(&self.materials));
         section(bytemuck::cast_slice(&self.lights));
         section(&self.atlas.texels);
@@ -80,7 +90,11 @@ impl FlatScene {
             section(bytemuck::cast_slice(&environment.radiance));
             section(bytemuck::cast_slice(&environment.alias));
         }
-        self.rig.arrays().into_iter().for_each(section);
+        self.rig.arrays().into_iter().for_each(&mut section);
+        section(bytemuck::cast_slice(&self.deformers.list));
+        section(bytemuck::cast_slice(&self.deformers.vertices));
+        section(bytemuck::cast_slice(&self.deformers.displacements));
+        section(bytemuck::cast_slice(&self.deformers.corners));
         out
     }
 
@@ -105,11 +119,28 @@ impl FlatScene {
         }
         let header = reader.take(u32::from_le_bytes(word(2)) as usize, "header")?;
         let header: Header = serde_json::from_slice(header).map_err(|e| bad("header", e.to_string()))?;
-        let Sections { nodes, triangles, materials, lights, atlas_texels, environment_texels } = header.sections;
+        let Sections {
+            nodes,
+            triangles,
+            attributes,
+            meshes,
+            instances,
+            materials,
+            lights,
+            atlas_texels,
+            environment_texels,
+            deformers,
+            deformer_vertices,
+            displacements,
+            corners,
+        } = header.sections;
         let scene = FlatScene {
             name: header.name,
             nodes: reader.array(nodes, "nodes")?,
             triangles: reader.array(triangles, "triangles")?,
+            attributes: reader.array(attributes, "attributes")?,
+            meshes: reader.array(meshes, "meshes")?,
+            instances: reader.array(instances, "instances")?,
             materials: reader.array(materials, "materials")?,
             lights: reader.array(lights, "lights")?,
             first_punctual: header.first_punctual,
@@ -128,6 +159,12 @@ impl FlatScene {
                 None => None,
             },
             rig: Rig::from_arrays(header.rig, &mut reader)?,
+            deformers: Deformers {
+                list: reader.array(deformers, "deformers")?,
+                vertices: reader.array(deformer_vertices, "deformers.vertices")?,
+                displacements: reader.array(displacements, "deformers.displacements")?,
+                corners: reader.array(corners, "deformers.corners")?,
+            },
             cameras: header.cameras.into_iter().map(CameraRecord::into_camera).collect(),
             bounds: header.bounds.map(Vec3::from_array),
             stats: header.stats,
@@ -207,10 +244,17 @@ fn header_of(scene: &FlatScene) -> Header {
         sections: Sections {
             nodes: scene.nodes.len(),
             triangles: scene.triangles.len(),
+            attributes: scene.attributes.len(),
+            meshes: scene.meshes.len(),
+            instances: scene.instances.len(),
             materials: scene.materials.len(),
             lights: scene.lights.len(),
             atlas_texels: scene.atlas.texels.len(),
             environment_texels: scene.environment.as_ref().map_or(0, |e| e.radiance.len()),
+            deformers: scene.deformers.list.len(),
+            deformer_vertices: scene.deformers.vertices.len(),
+            displacements: scene.deformers.displacements.len(),
+            corners: scene.deformers.corners.len(),
         },
     }
 }

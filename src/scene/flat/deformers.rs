@@ -61,14 +61,15 @@ impl Deformers {
     pub(super) fn check(&self, triangles: &[u32], placements: &[Placement]) -> Result<(), (String, String)> {
         for (i, deformer) in self.list.iter().enumerate() {
             let fault = |what: &str| Err((format!("deformers[{i}]"), what.to_owned()));
-            let Some(placement) = placements.get(deformer.placement as usize) else { return fault("no such placement") };
+            let Some(placement) = placements.get(deformer.placement as usize) else {
+                return fault("no such placement");
+            };
             let Some(&count) = triangles.get(deformer.mesh as usize) else { return fault("no such mesh") };
             let displaced = deformer.vertex_count.checked_mul(placement.weight_count);
             let fits = run(&self.vertices, deformer.first_vertex, deformer.vertex_count).len()
                 == deformer.vertex_count as usize
-                && displaced.is_some_and(|n| {
-                    run(&self.displacements, deformer.first_displacement, n).len() == n as usize
-                });
+                && displaced
+                    .is_some_and(|n| run(&self.displacements, deformer.first_displacement, n).len() == n as usize);
             let corners = self.corners_of(deformer, count);
             let inside = corners.iter().flatten().all(|&corner| corner < deformer.vertex_count);
             if !fits || corners.len() != count as usize || !inside {
@@ -109,8 +110,7 @@ pub fn write_shape(
         .map(|vertex| {
             let normal = pack(vertex.normal);
             let tangent = vertex.tangent.truncate();
-            let angle =
-                if has_tangents { octahedral::tangent_angle(octahedral::unpack(normal), tangent) } else { 0 };
+            let angle = if has_tangents { octahedral::tangent_angle(octahedral::unpack(normal), tangent) } else { 0 };
             (normal, angle)
         })
         .collect();

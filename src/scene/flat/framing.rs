@@ -56,7 +56,9 @@ fn sight(scene: &FlatScene, origin: Vec3, direction: Vec3) -> Option<f32> {
     let hit = intersect_cpu(scene, origin, direction, f32::INFINITY)?;
     let triangle = scene.triangles.get(hit.triangle as usize)?;
     let normal = (triangle.p1 - triangle.p0).cross(triangle.p2 - triangle.p0);
-    (normal.dot(direction) < 0.0).then_some(hit.t)
+    // Which side is seen is the same in the triangle's own space.
+    let to_object = scene.instances.get(hit.instance as usize)?.transform.inverse();
+    (normal.dot(to_object.transform_vector3(direction)) < 0.0).then_some(hit.t)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The light table and the environment, each with its alias table.
 
-use super::FlatEnvironment;
+use super::{FlatEnvironment, FlatInstance, FlatMesh};
 use crate::error::{Error, Result};
 use crate::scene::gpu_types::{
     LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, LIGHT_TRIANGLE, Light, Material, NONE, Triangle,
@@ -17,29 +17,54 @@ pub(super) fn luminance(color: Vec3) -> f64 {
     color.as_dvec3().dot(DVec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// The table: emissive triangles (which learn their index in it), punctual lights in order, the environment last.
-/// Returns it with the index of the first punctual light.
+/// Emissive triangles with what each weighs in the table.
+pub(super) type Emitters = Vec<(Light, f64)>;
+
+/// The emissive triangles of all instances, instance after instance; each triangle learns which of its instance's lights
+/// it is, each instance where its lights begin.
 ///
-/// A triangle weighs luminance x area (its texture is not considered: it can only make it darker), a punctual light the
-/// luminance of its intensity, the environment as much as all the others.
-pub(super) fn build(
+/// A triangle weighs luminance x area in the world, at rest (its texture is not considered: it can only make it darker).
+pub(super) fn emitters(
     triangles: &mut [Triangle],
+    meshes: &[FlatMesh],
+    instances: &mut [FlatInstance],
     materials: &[Material],
+) -> Emitters {
+    let emitted: Vec<f64> = materials.iter().map(|material| luminance(material.emissive)).collect();
+    let emission = |t: &Triangle| emitted.get(t.material as usize).copied().unwrap_or_default();
+    for mesh in meshes {
+        let range = mesh.first_triangle as usize..(mesh.first_triangle + mesh.triangles) as usize;
+        let emissive = triangles[range].iter_mut().filter(|t| emission(t) > 0.0);
+        emissive.zip(0..).for_each(|(triangle, number)| triangle.light = number);
+    }
+    let mut emitters = Emitters::new();
+    for (index, instance) in instances.iter_mut().enumerate() {
+        instance.first_light = emitters.len() as u32;
+        let mesh = &meshes[instance.mesh as usize];
+        for i in mesh.first_triangle..mesh.first_triangle + mesh.triangles {
+            let triangle = &triangles[i as usize];
+            if triangle.light == NONE {
+                continue;
+            }
+            let [p0, p1, p2] = [triangle.p0, triangle.p1, triangle.p2].map(|p| instance.transform.transform_point3(p));
+            let area = 0.5 * (p1 - p0).as_dvec3().cross((p2 - p0).as_dvec3()).length();
+            let light = Light { triangle: i, instance: index as u32, ..empty(LIGHT_TRIANGLE) };
+            emitters.push((light, emission(triangle) * area));
+        }
+    }
+    emitters
+}
+
+/// The table: emissive triangles, punctual lights in order, the environment last. Returns it with the index of the first
+/// punctual light.
+///
+/// A punctual light weighs the luminance of its intensity, the environment as much as all the others.
+pub(super) fn build(
+    emitters: Emitters,
     punctual: &[PunctualLight],
     has_environment: bool,
 ) -> Result<(Vec<Light>, u32)> {
-    let emitted: Vec<f64> = materials.iter().map(|material| luminance(material.emissive)).collect();
-    let mut lights = Vec::new();
-    let mut weights = Vec::new();
-    for (i, triangle) in triangles.iter_mut().enumerate() {
-        let emitted = emitted.get(triangle.material as usize).copied().unwrap_or_default();
-        if emitted > 0.0 {
-            triangle.light = lights.len() as u32;
-            lights.push(Light { triangle: i as u32, ..empty(LIGHT_TRIANGLE) });
-            let edges = (triangle.p1 - triangle.p0, triangle.p2 - triangle.p0);
-            weights.push(emitted * 0.5 * edges.0.as_dvec3().cross(edges.1.as_dvec3()).length());
-        }
-    }
+    let (mut lights, mut weights): (Vec<Light>, Vec<f64>) = emitters.into_iter().unzip();
     let first_punctual = lights.len() as u32;
     for (i, light) in punctual.iter().enumerate() {
         let sound = light.position.is_finite() && light.direction.is_finite() && !light.range.is_nan();
@@ -74,7 +99,6 @@ fn flatten(light: &PunctualLight) -> Light {
     };
     Light {
         position: light.position,
-        previous_position: light.position,
         direction: light.direction.try_normalize().unwrap_or(Vec3::NEG_Z),
         range: if light.range.is_finite() { light.range.max(0.0) } else { 0.0 },
         intensity: light.intensity,

@@ -2,18 +2,21 @@
 
 mod atlas;
 mod bytes;
+pub mod deformers;
 mod framing;
+pub(crate) mod levels;
 mod lights;
 mod materials;
 mod triangles;
 mod validate;
 
+pub use deformers::{Deformer, Deformers};
 pub(super) use triangles::face_normal;
 
-use super::gpu_types::{BvhNode, EnvironmentTexel, Light, Material, NONE, Triangle};
+use super::gpu_types::{BvhNode, EnvironmentTexel, Light, Material, NONE, Triangle, TriangleAttributes};
 use super::{Camera, MAX_COORDINATE, Projection, PunctualKind, Rig, Scene, bvh, rig};
 use crate::error::{Error, Result};
-use glam::{Vec3, Vec4};
+use glam::{Mat4, Vec3};
 
 /// All textures of a scene in layers of one size. Texels are as stored in the files (sRGB where the file says so).
 #[derive(Debug, Clone, PartialEq)]
@@ -42,8 +45,10 @@ pub struct FlatEnvironment {
 /// What a scene holds, for reports.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SceneStats {
-    /// Triangles after instancing.
+    /// Triangles that are held; those of a mesh that is shared by many instances once.
     pub triangles: u64,
+    /// Triangles that can be seen, after instancing.
+    pub placed_triangles: u64,
     /// Triangles dropped because they have no area or positions that are not finite.
     pub dropped_triangles: u64,
     /// Placements of meshes.
@@ -66,23 +71,64 @@ pub struct SceneStats {
     pub gpu_bytes: u64,
 }
 
-/// Pod arrays + flattened BVH. World space, metres, linear Rec. 709.
+/// A mesh with a bottom level of its own.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct FlatMesh {
+    /// Index of its root in `nodes`; its other nodes follow.
+    pub root: u32,
+    /// Number of nodes.
+    pub nodes: u32,
+    /// Its first triangle.
+    pub first_triangle: u32,
+    /// Number of triangles.
+    pub triangles: u32,
+    /// Index into [`Scene::meshes`], or `NONE` for what never moves and was merged in world space.
+    pub source: u32,
+}
+
+/// A mesh placed in the world.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct FlatInstance {
+    /// Object to world, at time 0 of the first animation.
+    pub transform: Mat4,
+    /// Index into [`FlatScene::meshes`].
+    pub mesh: u32,
+    /// Index in `lights` of the first of its emissive triangles.
+    pub first_light: u32,
+    /// Index into [`Scene::instances`], or `NONE` for the merged ones.
+    pub source: u32,
+    /// Unused.
+    pub padding: u32,
+}
+
+/// Pod arrays + flattened BVH. Metres, linear Rec. 709.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlatScene {
     /// For titles and reports.
     pub name: String,
-    /// Node 0 is the root; a scene without triangles has one leaf with a single point in it.
+    /// The bottom levels one after another, then the top level, if there is one, at rest. A scene without triangles has
+    /// one leaf with a single point in it.
     pub nodes: Vec<BvhNode>,
-    /// In BVH leaf order.
+    /// In BVH leaf order, mesh after mesh, each in its mesh's space.
     pub triangles: Vec<Triangle>,
+    /// Of each triangle.
+    pub attributes: Vec<TriangleAttributes>,
+    /// The bottom levels. The merged one, in world space, is the first if there is one.
+    pub meshes: Vec<FlatMesh>,
+    /// Where they stand.
+    pub instances: Vec<FlatInstance>,
     /// At least one.
     pub materials: Vec<Material>,
     /// With alias table; the environment, if any, is the last. May be empty.
     pub lights: Vec<Light>,
     /// Index in `lights` of the first punctual light; they follow in the order of [`Scene::lights`].
     pub first_punctual: u32,
-    /// What moves; its lights count from `first_punctual`, its cameras are indices in `cameras`.
+    /// What moves; its instances and cameras are those of this scene, its lights count from `first_punctual`.
     pub rig: Rig,
+    /// The meshes that change their shape.
+    pub deformers: Deformers,
     /// Textures.
     pub atlas: Atlas,
     /// Light from infinitely far away.
@@ -105,20 +151,12 @@ impl FlatScene {
     /// than a device can hold.
     pub fn build(scene: &Scene, progress: &mut dyn FnMut(f32, &str)) -> Result<Self> {
         let mut warnings = scene.warnings.clone();
-        let baked = triangles::bake(scene, &mut |fraction, what| progress(0.3 * fraction, what))?;
-        if baked.dropped > 0 {
-            warnings.push(format!("{} triangles without area or with unusable positions were left out", baked.dropped));
+        let geometry = levels::build(scene, &mut |fraction, what| progress(0.8 * fraction, what))?;
+        let levels::Levels { nodes, mut triangles, attributes, meshes, mut instances, deformers, rig, dropped, depth } =
+            geometry;
+        if dropped > 0 {
+            warnings.push(format!("{dropped} triangles without area or with unusable positions were left out"));
         }
-
-        progress(0.3, "building the BVH");
-        let mut unordered = baked.triangles;
-        let triangle_count = unordered.len() as u64;
-        if unordered.is_empty() {
-            unordered.push(POINT);
-        }
-        let bvh::Bvh { nodes, order, depth } = bvh::build(&unordered);
-        let mut triangles: Vec<Triangle> = order.iter().map(|&i| unordered[i as usize]).collect();
-        drop(unordered);
 
         progress(0.8, "packing textures");
         let (atlas, rectangles) = atlas::pack(scene, &mut warnings)?;
@@ -129,8 +167,11 @@ impl FlatScene {
             Some(environment) => lights::environment(environment)?,
             None => None,
         };
-        let (lights, first_punctual) = lights::build(&mut triangles, &materials, &scene.lights, environment.is_some())?;
-        let bounds = bounds(&nodes, scene);
+        let emitters = lights::emitters(&mut triangles, &meshes, &mut instances, &materials);
+        let (lights, first_punctual) = lights::build(emitters, &scene.lights, environment.is_some())?;
+
+        let root = if has_top(&meshes) { nodes.len() + 1 - 2 * instances.len() } else { 0 };
+        let bounds = bounds(nodes.get(root), scene);
         let mut flat = FlatScene {
             name: scene.name.clone(),
             cameras: Vec::new(),
@@ -138,22 +179,27 @@ impl FlatScene {
             stats: SceneStats::default(),
             nodes,
             triangles,
+            attributes,
+            meshes,
+            instances,
             materials,
             lights,
             first_punctual,
-            rig: scene.rig.clone(),
+            rig,
+            deformers,
             atlas,
             environment,
             warnings: Vec::new(),
         };
         flat.cameras = cameras(scene, &mut flat, &mut warnings);
         let counts =
-            rig::Counts { instances: scene.instances.len(), lights: scene.lights.len(), cameras: flat.cameras.len() };
+            rig::Counts { instances: flat.instances.len(), lights: scene.lights.len(), cameras: flat.cameras.len() };
         flat.rig.check(counts).map_err(|(place, what)| Error::bad_value(place, what))?;
         flat.warnings = warnings;
         flat.stats = SceneStats {
-            triangles: triangle_count,
-            dropped_triangles: baked.dropped,
+            triangles: flat.triangle_count(),
+            placed_triangles: flat.instances.iter().map(|i| u64::from(flat.meshes[i.mesh as usize].triangles)).sum(),
+            dropped_triangles: dropped,
             instances: scene.instances.len() as u64,
             materials: flat.materials.len() as u64,
             textures: scene.textures.len() as u64,
@@ -168,42 +214,46 @@ impl FlatScene {
         Ok(flat)
     }
 
+    /// The triangles that are not the point that stands in for none.
+    fn triangle_count(&self) -> u64 {
+        let has_area = |t: &&Triangle| (t.p1 - t.p0).cross(t.p2 - t.p0) != Vec3::ZERO;
+        match &self.triangles[..] {
+            [only] => [only].into_iter().filter(has_area).count() as u64,
+            all => all.len() as u64,
+        }
+    }
+
+    /// Whether there is a top level: more than one mesh that is in world space already.
+    pub fn has_top_level(&self) -> bool {
+        has_top(&self.meshes)
+    }
+
+    /// Index in `nodes` of the root of everything.
+    pub fn root(&self) -> u32 {
+        if self.has_top_level() { (self.nodes.len() + 1 - 2 * self.instances.len()) as u32 } else { 0 }
+    }
+
     /// Bytes of all arrays as the GPU holds them.
     fn gpu_bytes(&self) -> u64 {
         let environment =
             self.environment.as_ref().map_or(0, |e| size_of_val(&e.radiance[..]) + size_of_val(&e.alias[..]));
         let arrays = size_of_val(&self.nodes[..])
             + size_of_val(&self.triangles[..])
+            + size_of_val(&self.attributes[..])
+            + size_of::<super::gpu_types::Instance>() * self.instances.len()
             + size_of_val(&self.materials[..])
             + size_of_val(&self.lights[..]);
         (arrays + self.atlas.texels.len() + environment) as u64
     }
 }
 
-/// Stands in for the triangles of an empty scene: a point, which no ray hits.
-const POINT: Triangle = Triangle {
-    p0: Vec3::ZERO,
-    material: 0,
-    p1: Vec3::ZERO,
-    light: NONE,
-    p2: Vec3::ZERO,
-    instance: 0,
-    uv_a: Vec4::ZERO,
-    uv_b: Vec4::ZERO,
-    uv_c: Vec4::ZERO,
-    normal_0: 0,
-    normal_1: 0,
-    normal_2: 0,
-    tangents: 0,
-    color_0: u32::MAX,
-    color_1: u32::MAX,
-    color_2: u32::MAX,
-    flags: 0,
-};
+fn has_top(meshes: &[FlatMesh]) -> bool {
+    !matches!(meshes, [only] if only.source == NONE)
+}
 
 /// The box of the triangles, point and spot lights.
-fn bounds(nodes: &[BvhNode], scene: &Scene) -> [Vec3; 2] {
-    let root = nodes.first().map_or([Vec3::ZERO; 2], |root| [root.min, root.max]);
+fn bounds(root: Option<&BvhNode>, scene: &Scene) -> [Vec3; 2] {
+    let root = root.map_or([Vec3::ZERO; 2], |root| [root.min, root.max]);
     let placed = scene.lights.iter().filter(|light| light.kind != PunctualKind::Directional);
     let reach = Vec3::splat(MAX_COORDINATE);
     placed

@@ -1,64 +1,69 @@
-//! Instances baked to world-space triangles.
+//! Meshes as triangles: what traversal reads and what shading reads, in the space of a bottom level.
 
+use super::deformers::usable;
 use crate::error::{Error, Result};
 use crate::scene::gpu_types::{
-    NONE, TRIANGLE_ALPHA_MASK, TRIANGLE_BITANGENT_SHIFT, TRIANGLE_DOUBLE_SIDED, TRIANGLE_TANGENTS, Triangle,
+    BITANGENT_SHIFT, NONE, TRIANGLE_ALPHA_MASK, TRIANGLE_DOUBLE_SIDED, TRIANGLE_TANGENTS, Triangle, TriangleAttributes,
 };
-use crate::scene::{AlphaMode, Instance, MAX_COORDINATE, MAX_TRIANGLES, Mesh, Scene, octahedral};
-use glam::{Mat3, Vec2, Vec3, Vec4};
+use crate::scene::{AlphaMode, MAX_COORDINATE, Mesh, Scene, octahedral};
+use glam::{Mat3, Mat4, Vec2, Vec3, Vec4};
 
 /// Twice the area below which a triangle has none, in square metres: its square would be denormal.
 const MIN_TWICE_AREA: f32 = 1e-18;
 
-/// How often progress is told at most.
-const MAX_REPORTS: usize = 100;
-
-/// What baking found.
-pub(super) struct Baked {
+/// The triangles of one bottom level, in no order yet.
+#[derive(Default)]
+pub(super) struct Soup {
     pub triangles: Vec<Triangle>,
+    pub attributes: Vec<TriangleAttributes>,
+    /// Triangles left out because they have no area or are not finite.
     pub dropped: u64,
+    /// Of a mesh that changes its shape: the three vertices of each triangle.
+    pub corners: Vec<[u32; 3]>,
 }
 
-/// Bakes every instance. Meshes must have been checked by [`check`].
-pub(super) fn bake(scene: &Scene, progress: &mut dyn FnMut(f32, &str)) -> Result<Baked> {
-    let counts = scene.instances.iter().enumerate().map(|(i, instance)| {
-        let mesh = scene.meshes.get(instance.mesh as usize);
-        mesh.map(|mesh| mesh.indices.len() as u64 / 3)
-            .ok_or_else(|| Error::bad_value(format!("instance {i}"), format!("there is no mesh {}", instance.mesh)))
-    });
-    let total: u64 = counts.sum::<Result<u64>>()?;
-    if total > MAX_TRIANGLES {
-        return Err(Error::Limit {
-            what: "the scene after instancing".into(),
-            wanted: total,
-            had: MAX_TRIANGLES,
-            unit: "triangles",
-        });
-    }
-    for (i, mesh) in scene.meshes.iter().enumerate() {
-        check(mesh, scene.materials.len()).map_err(|what| Error::bad_value(format!("mesh {i}"), what))?;
-    }
-    let mut baked = Baked { triangles: Vec::with_capacity(total as usize), dropped: 0 };
-    let count = scene.instances.len();
-    for (i, instance) in scene.instances.iter().enumerate() {
-        // Each report may cross a thread.
-        if i.is_multiple_of(count.div_ceil(MAX_REPORTS)) {
-            progress(i as f32 / count as f32, "placing meshes");
-        }
-        let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
-        let flags = scene.materials.get(mesh.material as usize).map_or(0, |material| {
-            let masked = matches!(material.alpha, AlphaMode::Mask(_));
-            u32::from(material.double_sided) * TRIANGLE_DOUBLE_SIDED + u32::from(masked) * TRIANGLE_ALPHA_MASK
-        });
-        let placed = Placed::new(mesh, instance, i as u32, flags);
+impl Soup {
+    /// Adds a mesh through `transform`. The mesh must have been checked by [`check_all`].
+    pub fn add(&mut self, scene: &Scene, mesh: &Mesh, transform: Mat4) {
+        let flags = flags(scene, mesh);
+        let placed = Placed::new(mesh, transform, flags, false);
         for corners in mesh.indices.as_chunks::<3>().0 {
             match placed.triangle(corners.map(|c| c as usize)) {
-                Some(triangle) => baked.triangles.push(triangle),
-                None => baked.dropped += 1,
+                Some((triangle, attributes)) => {
+                    self.triangles.push(triangle);
+                    self.attributes.push(attributes);
+                }
+                None => self.dropped += 1,
             }
         }
     }
-    Ok(baked)
+}
+
+impl Soup {
+    /// A mesh that changes its shape, as it is. Triangles without area are kept, for they may gain some.
+    pub fn of_deforming(scene: &Scene, mesh: &Mesh) -> Soup {
+        let placed = Placed::new(mesh, Mat4::IDENTITY, flags(scene, mesh), true);
+        let corners = mesh.indices.as_chunks::<3>().0;
+        let each = corners.iter().filter_map(|corners| placed.triangle(corners.map(|c| c as usize)));
+        let (triangles, attributes) = each.unzip();
+        Soup { triangles, attributes, dropped: 0, corners: corners.to_vec() }
+    }
+}
+
+/// `TRIANGLE_*` bits that a mesh's material asks for.
+fn flags(scene: &Scene, mesh: &Mesh) -> u32 {
+    scene.materials.get(mesh.material as usize).map_or(0, |material| {
+        let masked = matches!(material.alpha, AlphaMode::Mask(_));
+        u32::from(material.double_sided) * TRIANGLE_DOUBLE_SIDED + u32::from(masked) * TRIANGLE_ALPHA_MASK
+    })
+}
+
+/// Checks every mesh.
+pub(super) fn check_all(scene: &Scene) -> Result<()> {
+    for (i, mesh) in scene.meshes.iter().enumerate() {
+        check(mesh, scene.materials.len()).map_err(|what| Error::bad_value(format!("mesh {i}"), what))?;
+    }
+    Ok(())
 }
 
 /// Whether every index and attribute count of a mesh fits.
@@ -92,32 +97,41 @@ fn check(mesh: &Mesh, materials: usize) -> std::result::Result<(), String> {
 /// A mesh with everything that placing it needs.
 struct Placed<'a> {
     mesh: &'a Mesh,
-    instance: &'a Instance,
-    index: u32,
+    transform: Mat4,
     flags: u32,
     linear: Mat3,
     /// Takes normals along: the cofactors, which exist for singular matrices too, with the determinant's sign.
     normal_matrix: Mat3,
     mirrored: bool,
+    /// Whether triangles without area are kept.
+    keeps_all: bool,
 }
 
 impl<'a> Placed<'a> {
-    fn new(mesh: &'a Mesh, instance: &'a Instance, index: u32, flags: u32) -> Self {
-        let linear = Mat3::from_mat4(instance.transform);
+    fn new(mesh: &'a Mesh, transform: Mat4, flags: u32, keeps_all: bool) -> Self {
+        let linear = Mat3::from_mat4(transform);
         let (x, y, z) = (linear.x_axis, linear.y_axis, linear.z_axis);
         let mirrored = linear.determinant() < 0.0;
         let sign = if mirrored { -1.0 } else { 1.0 };
         let normal_matrix = Mat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign;
-        Placed { mesh, instance, index, flags, linear, normal_matrix, mirrored }
+        Placed { mesh, transform, flags, linear, normal_matrix, mirrored, keeps_all }
     }
 
-    /// The triangle in world space, or none if it has no area or is not finite.
-    fn triangle(&self, mut corners: [usize; 3]) -> Option<Triangle> {
+    /// The triangle through the transform, or none if it has no area or is not finite.
+    fn triangle(&self, mut corners: [usize; 3]) -> Option<(Triangle, TriangleAttributes)> {
         if self.mirrored {
             corners.swap(1, 2);
         }
-        let [p0, p1, p2] = corners.map(|c| self.instance.transform.transform_point3(self.mesh.positions[c]));
-        let face = face_normal([p0, p1, p2])?;
+        let mut positions = corners.map(|c| self.transform.transform_point3(self.mesh.positions[c]));
+        let face = match face_normal(positions) {
+            Some(face) => face,
+            None if self.keeps_all => Vec3::Y,
+            None => return None,
+        };
+        if self.keeps_all {
+            positions = positions.map(usable);
+        }
+        let [p0, p1, p2] = positions;
         let has_tangents = !self.mesh.tangents.is_empty();
         let normals = corners.map(|c| {
             let normal = self.mesh.normals.get(c).and_then(|n| (self.normal_matrix * *n).try_normalize());
@@ -125,7 +139,7 @@ impl<'a> Placed<'a> {
             pack(normal.unwrap_or(face))
         });
         let mut flags = self.flags;
-        let mut angles = [0u32; 3];
+        let (mut angles, mut signs) = ([0u32; 3], 0);
         if has_tangents {
             flags |= TRIANGLE_TANGENTS;
             for (k, &corner) in corners.iter().enumerate() {
@@ -134,32 +148,24 @@ impl<'a> Placed<'a> {
                 angles[k] = u32::from(octahedral::tangent_angle(octahedral::unpack(normals[k]), along));
                 // A mirror turns cross(normal, tangent) round against the mirrored bitangent.
                 if (tangent.w < 0.0) != self.mirrored {
-                    flags |= 1 << (TRIANGLE_BITANGENT_SHIFT + k as u32);
+                    signs |= 1 << (BITANGENT_SHIFT + k as u32);
                 }
             }
         }
         let uv = |set: usize, k: usize| finite_or_zero(self.mesh.uvs[set].get(corners[k]).copied().unwrap_or_default());
         let colors = corners.map(|c| self.mesh.colors.get(c).map_or(u32::MAX, |color| pack_color(*color)));
         let pair = |a: Vec2, b: Vec2| Vec4::new(a.x, a.y, b.x, b.y);
-        Some(Triangle {
-            p0,
-            material: self.mesh.material,
-            p1,
-            light: NONE,
-            p2,
-            instance: self.index,
+        let triangle = Triangle { p0, flags, p1, material: self.mesh.material, p2, light: NONE };
+        let attributes = TriangleAttributes {
             uv_a: pair(uv(0, 0), uv(0, 1)),
             uv_b: pair(uv(0, 2), uv(1, 0)),
             uv_c: pair(uv(1, 1), uv(1, 2)),
-            normal_0: normals[0],
-            normal_1: normals[1],
-            normal_2: normals[2],
-            tangents: angles[0] | angles[1] << 16,
-            color_0: colors[0],
-            color_1: colors[1],
-            color_2: colors[2],
-            flags: flags | angles[2] << 16,
-        })
+            normals,
+            tangents_01: angles[0] | angles[1] << 16,
+            colors,
+            tangent_2: angles[2] | signs,
+        };
+        Some((triangle, attributes))
     }
 }
 

@@ -1,19 +1,24 @@
 //! Whether a flat scene that came from outside may be rendered: shaders check no index.
 
 use super::{Atlas, FlatEnvironment, FlatScene};
-use crate::scene::bvh::MAX_DEPTH;
-use crate::scene::gpu_types::{LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, Material, NONE, TextureSlot, Triangle};
+use crate::scene::bvh::{MAX_DEPTH, MAX_TOP_DEPTH};
+use crate::scene::gpu_types::{
+    LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, Material, NONE, TextureSlot, Triangle, TriangleAttributes,
+};
 use crate::scene::rig::Counts;
+use std::ops::Range;
 
 /// (where, what is wrong there).
 type Fault = (String, String);
 
 /// The first fault, if any.
 pub(super) fn validate(scene: &FlatScene) -> Result<(), Fault> {
-    tree(scene)?;
-    each("triangles", &scene.triangles, |i, triangle| check_triangle(scene, i, triangle))?;
+    forest(scene)?;
+    each("triangles", &scene.triangles, |_, triangle| check_triangle(scene, triangle))?;
+    each("attributes", &scene.attributes, |_, attributes| check_attributes(attributes))?;
     each("materials", &scene.materials, |_, material| check_material(&scene.atlas, material))?;
     each("lights", &scene.lights, |i, light| check_light(scene, i, light))?;
+    emitters(scene)?;
     let punctual = (scene.lights.len() as u64).checked_sub(u64::from(scene.first_punctual));
     let punctual = punctual.ok_or_else(|| fault("first_punctual", "past the lights"))?;
     check_atlas(&scene.atlas).map_err(|what| fault("atlas", what))?;
@@ -24,9 +29,10 @@ pub(super) fn validate(scene: &FlatScene) -> Result<(), Fault> {
         let finite = camera.position.is_finite() && camera.forward.is_finite() && camera.up.is_finite();
         must(finite, "numbers that are not finite")
     })?;
-    let counts =
-        Counts { instances: scene.stats.instances as usize, lights: punctual as usize, cameras: scene.cameras.len() };
+    let counts = Counts { instances: scene.instances.len(), lights: punctual as usize, cameras: scene.cameras.len() };
     scene.rig.check(counts)?;
+    let triangles: Vec<u32> = scene.meshes.iter().map(|mesh| mesh.triangles).collect();
+    scene.deformers.check(&triangles, &scene.rig.instances)?;
     let complete = !scene.materials.is_empty() && !scene.cameras.is_empty();
     must(complete, "materials or cameras are missing").map_err(|what| fault("scene", what))?;
     must(scene.bounds.iter().all(|corner| corner.is_finite()), "not finite").map_err(|what| fault("bounds", what))
@@ -47,39 +53,110 @@ fn each<T>(name: &str, items: &[T], mut check: impl FnMut(usize, &T) -> Result<(
         .try_for_each(|(i, item)| check(i, item).map_err(|what| fault(format!("{name}[{i}]"), what)))
 }
 
-/// Children come after their parent and belong to it alone, so that every walk ends; no path is too long.
-fn tree(scene: &FlatScene) -> Result<(), Fault> {
-    must(!scene.nodes.is_empty(), "empty").map_err(|what| fault("nodes", what))?;
-    let mut depths = vec![0u32; scene.nodes.len()];
-    depths[0] = 1;
-    each("nodes", &scene.nodes, |i, node| {
-        must(node.min.is_finite() && node.max.is_finite(), "a box that is not finite")?;
-        let depth = depths[i];
-        must(depth != 0, "belongs to no node before it")?;
-        let first = node.first as usize;
-        if node.count != 0 {
-            let end = first.checked_add(node.count as usize);
-            return must(end.is_some_and(|end| end <= scene.triangles.len()), "triangles out of range");
-        }
-        must(depth < MAX_DEPTH, "too deep")?;
-        match depths.get_mut(first..).and_then(|rest| rest.get_mut(..2)) {
-            Some(children) if first > i && *children == [0, 0] => {
-                children.fill(depth + 1);
-                Ok(())
+/// Meshes cover all nodes and triangles one after another, then comes the top level; each is a tree; instances refer to
+/// meshes.
+fn forest(scene: &FlatScene) -> Result<(), Fault> {
+    must(!scene.meshes.is_empty(), "empty").map_err(|what| fault("meshes", what))?;
+    must(scene.attributes.len() == scene.triangles.len(), "not one a triangle")
+        .map_err(|what| fault("attributes", what))?;
+    let (mut node, mut triangle) = (0u32, 0u32);
+    for (i, mesh) in scene.meshes.iter().enumerate() {
+        let follows = mesh.root == node && mesh.first_triangle == triangle && mesh.nodes > 0 && mesh.triangles > 0;
+        let ends = node.checked_add(mesh.nodes).zip(triangle.checked_add(mesh.triangles));
+        match ends {
+            Some(ends)
+                if follows && ends.0 as usize <= scene.nodes.len() && ends.1 as usize <= scene.triangles.len() =>
+            {
+                tree(scene, node..ends.0, triangle..ends.1, MAX_DEPTH)?;
+                (node, triangle) = ends;
             }
-            _ => Err("children out of range or shared"),
+            _ => return Err(fault(format!("meshes[{i}]"), "out of place")),
         }
-    })
+    }
+    must(triangle as usize == scene.triangles.len(), "more than the meshes'")
+        .map_err(|what| fault("triangles", what))?;
+    each("instances", &scene.instances, |_, instance| {
+        must((instance.mesh as usize) < scene.meshes.len(), "no such mesh")?;
+        must(instance.transform.is_finite(), "a transform that is not finite")?;
+        must(instance.first_light <= scene.first_punctual, "lights out of range")
+    })?;
+    let complete = !scene.instances.is_empty() && (scene.has_top_level() || scene.instances.len() == 1);
+    must(complete, "too few or too many").map_err(|what| fault("instances", what))?;
+    let top_nodes = if scene.has_top_level() { 2 * scene.instances.len() - 1 } else { 0 };
+    must(scene.nodes.len() - node as usize == top_nodes, "a top level of another size")
+        .map_err(|what| fault("nodes", what))?;
+    if top_nodes > 0 {
+        tree(scene, node..scene.nodes.len() as u32, 0..scene.instances.len() as u32, MAX_TOP_DEPTH)?;
+    }
+    Ok(())
 }
 
-fn check_triangle(scene: &FlatScene, index: usize, triangle: &Triangle) -> Result<(), &'static str> {
-    let Triangle { p0, p1, p2, uv_a, uv_b, uv_c, .. } = triangle;
+/// Within `range` children come after their parent and belong to it alone, so that every walk ends; no path is too long;
+/// leaves hold some of `items`.
+fn tree(scene: &FlatScene, range: Range<u32>, items: Range<u32>, max_depth: u32) -> Result<(), Fault> {
+    let start = range.start as usize;
+    let mut depths = vec![0u32; range.len()];
+    depths[0] = 1;
+    for i in 0..depths.len() {
+        let check = || {
+            let node = &scene.nodes[start + i];
+            must(node.min.is_finite() && node.max.is_finite(), "a box that is not finite")?;
+            must(depths[i] != 0, "belongs to no node before it")?;
+            if node.count != 0 {
+                let end = node.first.checked_add(node.count);
+                let within = node.first >= items.start && end.is_some_and(|end| end <= items.end);
+                return must(within, "triangles out of range").map(|()| None);
+            }
+            must(depths[i] < max_depth, "too deep")?;
+            let first = (node.first as usize).checked_sub(start).filter(|&first| first > i);
+            let children = first.and_then(|first| depths.get(first..first.checked_add(2)?).map(|pair| (first, pair)));
+            match children {
+                Some((first, [0, 0])) => Ok(Some(first)),
+                _ => Err("children out of range or shared"),
+            }
+        };
+        if let Some(first) = check().map_err(|what| fault(format!("nodes[{}]", start + i), what))? {
+            let below = depths[i] + 1;
+            depths[first..first + 2].fill(below);
+        }
+    }
+    Ok(())
+}
+
+fn check_attributes(attributes: &TriangleAttributes) -> Result<(), &'static str> {
+    let TriangleAttributes { uv_a, uv_b, uv_c, .. } = attributes;
+    must(uv_a.is_finite() && uv_b.is_finite() && uv_c.is_finite(), "texture coordinates that are not finite")
+}
+
+fn check_triangle(scene: &FlatScene, triangle: &Triangle) -> Result<(), &'static str> {
+    let Triangle { p0, p1, p2, .. } = triangle;
     must(p0.is_finite() && p1.is_finite() && p2.is_finite(), "a position that is not finite")?;
-    must(uv_a.is_finite() && uv_b.is_finite() && uv_c.is_finite(), "texture coordinates that are not finite")?;
-    must((triangle.material as usize) < scene.materials.len(), "no such material")?;
-    let light = scene.lights.get(triangle.light as usize);
-    let mutual = light.is_some_and(|light| light.kind == LIGHT_TRIANGLE && light.triangle as usize == index);
-    must(triangle.light == NONE || mutual, "not the light it says it is")
+    must((triangle.material as usize) < scene.materials.len(), "no such material")
+}
+
+/// Every instance's emissive triangles are the lights it says they are.
+fn emitters(scene: &FlatScene) -> Result<(), Fault> {
+    let mut expected = 0;
+    for (i, instance) in scene.instances.iter().enumerate() {
+        let mesh = &scene.meshes[instance.mesh as usize];
+        must(instance.first_light == expected, "lights out of order")
+            .map_err(|what| fault(format!("instances[{i}]"), what))?;
+        for index in mesh.first_triangle..mesh.first_triangle + mesh.triangles {
+            let triangle = &scene.triangles[index as usize];
+            if triangle.light == NONE {
+                continue;
+            }
+            let light = scene.lights.get(expected as usize);
+            let number = expected - instance.first_light;
+            let mutual = light.is_some_and(|l| {
+                l.kind == LIGHT_TRIANGLE && l.triangle == index && l.instance as usize == i && triangle.light == number
+            });
+            must(mutual, "not the light it says it is").map_err(|what| fault(format!("triangles[{index}]"), what))?;
+            expected += 1;
+        }
+    }
+    must(expected == scene.first_punctual, "not where the punctual lights begin")
+        .map_err(|what| fault("first_punctual", what))
 }
 
 fn check_material(atlas: &Atlas, material: &Material) -> Result<(), &'static str> {
@@ -106,19 +183,16 @@ fn check_material(atlas: &Atlas, material: &Material) -> Result<(), &'static str
 }
 
 fn check_light(scene: &FlatScene, index: usize, light: &Light) -> Result<(), &'static str> {
-    let Light { position, previous_position, direction, intensity, .. } = light;
-    let vectors = [position, previous_position, direction, intensity];
+    let Light { position, direction, intensity, .. } = light;
+    let vectors = [position, direction, intensity];
     let scalars = [light.range, light.cos_inner, light.cos_outer, light.pmf, light.alias_threshold];
     let finite = vectors.iter().all(|v| v.is_finite()) && scalars.iter().all(|s| s.is_finite());
     must(finite, "numbers that are not finite")?;
     must((light.alias_light as usize) < scene.lights.len(), "alias out of range")?;
     let is_last = index + 1 == scene.lights.len();
     match light.kind {
-        LIGHT_TRIANGLE => {
-            let triangle = scene.triangles.get(light.triangle as usize);
-            let mutual = triangle.is_some_and(|triangle| triangle.light as usize == index);
-            must(mutual && index < scene.first_punctual as usize, "not the triangle it says it is")
-        }
+        // That it is the triangle it says it is, `emitters` has seen.
+        LIGHT_TRIANGLE => must(index < scene.first_punctual as usize, "a triangle out of place"),
         LIGHT_ENVIRONMENT => must(is_last && scene.environment.is_some(), "an environment out of place"),
         kind => must(kind < LIGHT_ENVIRONMENT && index >= scene.first_punctual as usize, "an unknown kind"),
     }

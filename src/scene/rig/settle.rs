@@ -70,7 +70,7 @@ impl Mesh {
     }
 
     /// This mesh in the shape that weights and joints give it.
-    fn shaped(&self, weights: &[f32], joints: &[Mat4]) -> Mesh {
+    pub(in crate::scene) fn shaped(&self, weights: &[f32], joints: &[Mat4]) -> Mesh {
         let displacements = self.deformation.targets.concat();
         let mut deformed = Vec::new();
         deform::deform(&self.vertices(), &displacements, weights, joints, &mut deformed);
