@@ -46,29 +46,54 @@ fn passes_alpha(triangle: u32, uv: vec2f) -> bool {
     return alpha >= material.alpha_cutoff;
 }
 
-// Möller and Trumbore 1997. A triangle seen from its back is missed unless it is double-sided (glTF 2.0, 3.9.6).
+// The sign of the volume that a ray from the origin spans with the edge from a to b (its Plücker product). The same edge
+// seen from the triangle on its other side gives exactly the negative value, however the arithmetic is contracted: a ray
+// cannot pass between two triangles that share an edge.
+fn edge_product(a: vec3f, b: vec3f, direction: vec3f) -> f32 {
+    return dot(cross(a - b, a + b), direction);
+}
+
+fn largest_component(v: vec3f) -> f32 {
+    return max(abs(v.x), max(abs(v.y), abs(v.z)));
+}
+
+// Edge tests by Plücker products (Davidovic et al. 2012, "3D rasterization: a bridge between rasterization and ray
+// casting"), watertight along edges; rounding is let pass, so that they are at corners too, where many triangles meet. A
+// triangle seen from its back is missed unless it is double-sided (glTF 2.0, 3.9.6).
 fn intersect_triangle(index: u32, instance: u32, origin: vec3f, direction: vec3f, hit: ptr<function, Hit>) {
     let triangle = load_triangle(index);
     let e1 = triangle.p1 - triangle.p0;
     let e2 = triangle.p2 - triangle.p0;
-    let p = cross(direction, e2);
-    let determinant = dot(e1, p);
-    if determinant <= 0.0 && (determinant == 0.0 || (triangle.flags & TRIANGLE_DOUBLE_SIDED) == 0u) {
+    let p0 = triangle.p0 - origin;
+    let p1 = triangle.p1 - origin;
+    let p2 = triangle.p2 - origin;
+    let w0 = edge_product(p2, p1, direction);
+    let w1 = edge_product(p0, p2, direction);
+    let w2 = edge_product(p1, p0, direction);
+    let sum = w0 + w1 + w2;
+    // All of one sign, but for rounding (16 units of roundoff of the largest products); which sign says from which side
+    // the ray comes.
+    let edge = max(largest_component(e1), largest_component(e2));
+    let rounding = 1e-6 * largest_component(direction) * edge * (largest_component(p0) + edge);
+    let is_front = sum > 0.0 && min(w0, min(w1, w2)) >= -rounding;
+    let is_back = sum < 0.0 && max(w0, max(w1, w2)) <= rounding && (triangle.flags & TRIANGLE_DOUBLE_SIDED) != 0u;
+    if !is_front && !is_back {
         return;
     }
-    let inverse = 1.0 / determinant;
-    let s = origin - triangle.p0;
-    let u = dot(s, p) * inverse;
-    let q = cross(s, e1);
-    let v = dot(direction, q) * inverse;
-    let t = dot(e2, q) * inverse;
-    if u < 0.0 || v < 0.0 || u + v > 1.0 || t <= 0.0 || t >= (*hit).t {
+    let normal = cross(e1, e2);
+    // In a sliver rounding may turn the normal's sign against the ray; the edge products know better.
+    let speed = abs(dot(direction, normal));
+    let t = dot(p0, normal) / select(speed, -speed, is_front);
+    // Not `t >= hit.t`, which is false for the NaN of a ray within the plane.
+    if !(t > 0.0 && t < (*hit).t) {
         return;
     }
-    if scene_has_alpha_masks && (triangle.flags & TRIANGLE_ALPHA_MASK) != 0u && !passes_alpha(index, vec2f(u, v)) {
+    let u = clamp(w1 / sum, 0.0, 1.0);
+    let uv = vec2f(u, clamp(w2 / sum, 0.0, 1.0 - u));
+    if scene_has_alpha_masks && (triangle.flags & TRIANGLE_ALPHA_MASK) != 0u && !passes_alpha(index, uv) {
         return;
     }
-    *hit = Hit(t, index, vec2f(u, v), instance);
+    *hit = Hit(t, index, uv, instance);
 }
 
 // Where the ray enters the node's box, or a huge number if it misses it within [0, t_max].
@@ -156,12 +181,4 @@ fn traverse_from(top_level: u32, world_origin: vec3f, world_direction: vec3f, t_
 // The same in this frame's scene.
 fn traverse(origin: vec3f, direction: vec3f, t_max: f32, any_hit: bool) -> Hit {
     return traverse_from(frame.top_level, origin, direction, t_max, any_hit);
-}
-
-// A point moved off its surface along the geometric normal far enough that a ray from it cannot hit the surface again,
-// by integer steps of the float's own resolution (Wächter and Binder 2019, Ray Tracing Gems, chapter 6).
-fn offset_origin(position: vec3f, normal: vec3f) -> vec3f {
-    let step = vec3i(normal * 256.0);
-    let moved = bitcast<vec3f>(bitcast<vec3i>(position) + select(step, -step, position < vec3f(0.0)));
-    return select(moved, position + normal * (1.0 / 65536.0), abs(position) < vec3f(1.0 / 32.0));
 }

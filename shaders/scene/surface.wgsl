@@ -4,6 +4,7 @@
 
 struct Surface {
     position: vec3f,
+    position_error: f32, // how far along the normal rounding may have moved the position, or a ray's view of the triangle
     geometric_normal: vec3f, // unit, on the side of wo
     basis: Basis, // round the shading normal
     wo: vec3f, // unit, world space, towards the viewer
@@ -65,6 +66,22 @@ fn triangle_point(instance: u32, triangle: u32, uv: vec2f) -> vec3f {
         return point;
     }
     return instance_point(instance, TO_WORLD, point);
+}
+
+// A bound on the distance, along the normal, between a point computed on a triangle and the plane that rays from there are
+// tested against: the rounding of the point and of the differences to the corners (8 units of roundoff of the largest
+// coordinates), and that of the cross product, which grows as the triangle becomes a sliver. After Pharr, Jakob and
+// Humphreys 2016, section 3.9; the constants are ours and tests/watertight.rs tests them.
+fn triangle_error(instance: u32, triangle: u32, unit_normal: vec3f) -> f32 {
+    let corners = triangle_corners(instance, triangle);
+    let largest = max(max(abs(corners.p0), abs(corners.p1)), abs(corners.p2));
+    let e1 = corners.p1 - corners.p0;
+    let e2 = corners.p2 - corners.p0;
+    let lengths = vec2f(length(e1), length(e2));
+    let sliver = lengths.x * lengths.y * max(lengths.x, lengths.y) / max(length(cross(e1, e2)), 1e-30);
+    let error = 4.8e-7 * dot(abs(unit_normal), largest) + 2.4e-7 * sliver;
+    // Rays go through a matrix on the way to an instance's triangles, points on the way back.
+    return select(error, 4.0 * (error + 1.2e-7 * max(largest.x, max(largest.y, largest.z))), scene_has_instances);
 }
 
 // Radiance that a point of an emissive triangle sends out of its front; black where its alpha mask cuts it away.
@@ -132,6 +149,7 @@ fn load_surface(instance: u32, triangle: u32, uv: vec2f, wo: vec3f) -> Surface {
     let is_front = dot(front, wo) >= 0.0;
     let side = select(-1.0, 1.0, is_front);
     surface.geometric_normal = front * side;
+    surface.position_error = triangle_error(instance, triangle, front);
     var n = shading_normal(triangle, uv, uvs) * side;
     if scene_has_instances {
         n = normalize(instance_normal(instance, n));
@@ -182,6 +200,13 @@ fn surface_sample(surface: Surface, u: vec3f) -> vec3f {
         brdf_sample(surface.brdf, basis_to_local(surface.basis, surface.wo), u)));
 }
 
+// Where a ray that leaves the surface towards `direction` begins: off the surface on that side, by no more than rounding
+// makes necessary, so that it cannot hit the triangle it comes from.
+fn ray_origin(surface: Surface, direction: vec3f) -> vec3f {
+    let side = select(-1.0, 1.0, dot(surface.geometric_normal, direction) >= 0.0);
+    return surface.position + surface.geometric_normal * (side * surface.position_error);
+}
+
 // Whether nothing stands between the surface and the point at `distance` along wi. The ray starts a little above the
 // surface and still ends in that point: moved as a whole, it could run into a light before its end.
 fn is_visible(surface: Surface, wi: vec3f, distance: f32) -> bool {
@@ -190,7 +215,7 @@ fn is_visible(surface: Surface, wi: vec3f, distance: f32) -> bool {
 
 // The same in the scene of a frame, this one's or the previous one's, whose root is `top_level`.
 fn is_visible_from(top_level: u32, surface: Surface, wi: vec3f, distance: f32) -> bool {
-    let origin = offset_origin(surface.position, surface.geometric_normal);
+    let origin = ray_origin(surface, wi);
     let direction = wi - (origin - surface.position) / max(distance, 1e-12);
     return traverse_from(top_level, origin, direction, distance, true).triangle == NONE;
 }

@@ -68,22 +68,30 @@ fn walk(
     }
 }
 
-/// Möller and Trumbore 1997: (t, u, v) if 0 < t < `t_max`.
+/// The Plücker product of a ray from the origin and the edge from a to b: exactly the negative for the edge reversed.
+fn edge_product(a: Vec3, b: Vec3, direction: Vec3) -> f32 {
+    (a - b).cross(a + b).dot(direction)
+}
+
+/// Edge tests by Plücker products (Davidovic et al. 2012), rounding let pass: (t, u, v) if 0 < t < `t_max`.
 pub fn intersect_triangle(triangle: &Triangle, origin: Vec3, direction: Vec3, t_max: f32) -> Option<(f32, f32, f32)> {
     let (e1, e2) = (triangle.p1 - triangle.p0, triangle.p2 - triangle.p0);
-    let p = direction.cross(e2);
-    let determinant = e1.dot(p);
-    let culled = determinant < 0.0 && triangle.flags & TRIANGLE_DOUBLE_SIDED == 0;
-    if determinant == 0.0 || culled {
-        return None;
-    }
-    let inverse = 1.0 / determinant;
-    let s = origin - triangle.p0;
-    let u = s.dot(p) * inverse;
-    let q = s.cross(e1);
-    let v = direction.dot(q) * inverse;
-    let t = e2.dot(q) * inverse;
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && t < t_max).then_some((t, u, v))
+    let [p0, p1, p2] = [triangle.p0, triangle.p1, triangle.p2].map(|p| p - origin);
+    let [w0, w1, w2] = [(p2, p1), (p0, p2), (p1, p0)].map(|(a, b)| edge_product(a, b, direction));
+    let sum = w0 + w1 + w2;
+    let largest = |v: Vec3| v.abs().max_element();
+    let edge = largest(e1).max(largest(e2));
+    let rounding = 1e-6 * largest(direction) * edge * (largest(p0) + edge);
+    let is_front = sum > 0.0 && w0.min(w1).min(w2) >= -rounding;
+    let is_double_sided = triangle.flags & TRIANGLE_DOUBLE_SIDED != 0;
+    let is_back = sum < 0.0 && w0.max(w1).max(w2) <= rounding && is_double_sided;
+    let normal = e1.cross(e2);
+    let speed = direction.dot(normal).abs();
+    let t = p0.dot(normal) / if is_front { -speed } else { speed };
+    let hits = (is_front || is_back) && t > 0.0 && t < t_max;
+    // `min` and `max` rather than `clamp`, which does not bear a NaN.
+    let u = (w1 / sum).max(0.0).min(1.0);
+    hits.then_some((t, u, (w2 / sum).max(0.0).min(1.0 - u)))
 }
 
 /// Whether the ray meets the node's box within [0, t_max], two ulps wider so that rounding loses none (Ize 2013).

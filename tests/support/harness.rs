@@ -70,7 +70,6 @@ pub mod scene_functions {
     pub const ENVIRONMENT: u32 = 4;
     pub const ENVIRONMENT_SAMPLE: u32 = 5;
     pub const CAMERA: u32 = 6;
-    pub const OFFSET_ORIGIN: u32 = 7;
     pub const SHADING_NORMAL: u32 = 8;
     pub const SHADOW_RAY: u32 = 9;
 }

@@ -75,7 +75,7 @@ fn scattered_radiance(start: Surface, direct: bool, rng: ptr<function, Rng>) -> 
             throughput /= q;
         }
 
-        let hit = traverse(offset_origin(surface.position, surface.geometric_normal), wi, 3.0e38, false);
+        let hit = traverse(ray_origin(surface, wi), wi, 3.0e38, false);
         if hit.triangle == NONE {
             if counts {
                 radiance += throughput * weighted_environment(wi, pdf);
