@@ -121,7 +121,7 @@ impl Renderer {
             render_params: RenderParams::default(),
             film_params: FilmParams::default(),
             camera,
-            followed: None,
+            followed: Some(0),
             previous_camera: None,
             has_history: false,
             view: 0,
@@ -202,7 +202,7 @@ impl Renderer {
         self.stage = Stage::new(&scene, 0, 0.0);
         self.scene = scene;
         self.camera = camera;
-        self.followed = None;
+        self.followed = Some(0);
         self.clip = 0;
         self.set_time(0.0);
         self.reset();

@@ -160,3 +160,17 @@ fn refitted_levels_hold_every_triangle() {
         }
     }
 }
+
+#[test]
+fn what_hangs_on_nodes_that_stand_still_is_merged() {
+    let mut scene = restir::scene::builtin::make("motion").unwrap();
+    scene.rig.channels.retain(|channel| channel.node == scene.rig.instances[BOX].node);
+    scene.rig.clips[0].channel_count = scene.rig.channels.len() as u32;
+    let flat = flatten(&scene);
+    assert_eq!((flat.rig.instances.len(), flat.deformers.list.len(), flat.instances.len()), (1, 0, 2));
+    check_vectors(&scene, BOX, 0, [0.9, 1.0]);
+    scene.rig.channels.clear();
+    scene.rig.clips.clear();
+    let flat = flatten(&scene);
+    assert!(!flat.has_top_level() && flat.rig.instances.is_empty());
+}

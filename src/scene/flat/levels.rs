@@ -195,12 +195,19 @@ impl Levels {
         for (i, instance) in self.instances.iter().enumerate() {
             of_source.insert(instance.source, i as u32);
         }
-        for placement in &mut self.rig.instances {
-            // Everything that moves has an instance of its own.
+        // Everything that moves has an instance of its own; what was merged is the rig's no longer.
+        let mut kept = Vec::new();
+        let mut numbers = vec![NONE; self.rig.instances.len()];
+        for (placement, number) in self.rig.instances.iter().zip(&mut numbers) {
             if let Some(&instance) = of_source.get(&placement.instance) {
-                placement.instance = instance;
                 self.instances[instance as usize].transform = pose.instance(placement);
+                *number = kept.len() as u32;
+                kept.push(rig::Placement { instance, ..*placement });
             }
+        }
+        self.rig.instances = kept;
+        for deformer in &mut self.deformers.list {
+            deformer.placement = numbers[deformer.placement as usize];
         }
     }
 
