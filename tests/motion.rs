@@ -103,11 +103,10 @@ const BOX: usize = 2;
 fn motion_vectors_find_known_points() {
     let scene = restir::scene::builtin::make("motion").unwrap();
     for (what, index) in [("skinned", COLUMN), ("morphed", BALL), ("rigid", BOX)] {
-        for (camera, times) in [(0, [0.9, 1.0]), (1, [0.9, 1.0]), (0, [2.6, 2.5])] {
+        for (camera, times) in [(0, [0.5, 1.5]), (1, [0.5, 1.5]), (0, [3.0, 2.2])] {
             let (pixels, motion) = check_vectors(&scene, index, camera, times);
             assert!(pixels > 50, "{what}: {pixels} pixels are too few to tell");
-            // The bumps of the ball grow by less than a pixel in that time.
-            assert!(motion > 0.1, "{what} has hardly moved: {motion}");
+            assert!(motion > 0.2, "{what} has hardly moved: {motion}");
         }
     }
 }
@@ -132,7 +131,7 @@ fn still_things_and_the_background_move_with_the_camera() {
     assert!(background > 1000, "{background}");
     // A camera that stands still sees still things at rest, and the first frame has nothing to compare with.
     let (_, _, motion) = two_moments(&flatten(&scene), 0, [0.9, 0.9]);
-    assert!(motion.iter().all(|motion| *motion == [0.0; 2]));
+    assert!(motion.iter().flatten().all(|motion| motion.abs() < 1e-3));
 }
 
 #[test]

@@ -313,3 +313,28 @@ fn mutated_rigs_in_bytes_do_no_harm() {
     }
     assert!(refused > 300, "{refused}");
 }
+
+#[test]
+fn a_hundred_thousand_vertices_are_skinned_in_milliseconds() {
+    let vertex = |i: u32| deform::Vertex {
+        position: Vec3::new(i as f32 * 1e-3, 1.0, 0.0),
+        normal: Vec3::Y,
+        tangent: [1.0, 0.0, 0.0, 1.0],
+        joints: [i % 60, i % 59, i % 58, i % 57].map(|joint| joint as u16),
+        weights: [0.4, 0.3, 0.2, 0.1],
+    };
+    let vertices: Vec<_> = (0..100_000).map(vertex).collect();
+    let joints: Vec<Mat4> = (0..60).map(|i| Mat4::from_rotation_z(i as f32 * 0.01)).collect();
+    let mut out = Vec::new();
+    let mut times: Vec<Duration> = (0..9)
+        .map(|_| {
+            let start = Instant::now();
+            deform::deform(&vertices, &[], &[], &joints, &mut out);
+            start.elapsed()
+        })
+        .collect();
+    times.sort();
+    println!("100,000 vertices with four joints each: {:?} (median of 9)", times[4]);
+    // A hundred times what it takes: only an accident of complexity is worth a failure.
+    assert!(times[4] < Duration::from_secs(1), "{times:?}");
+}

@@ -147,6 +147,8 @@ pub(super) fn build(scene: &Scene, progress: &mut dyn FnMut(f32, &str)) -> Resul
         levels.add(scene, group, soup);
     }
     levels.follow(&pose);
+    let triangles: Vec<u32> = levels.meshes.iter().map(|mesh| mesh.triangles).collect();
+    levels.deformers.check(&triangles, &levels.rig.instances).map_err(|(place, what)| Error::bad_value(place, what))?;
     let root_boxes: Vec<[Vec3; 2]> = levels.instances.iter().map(|i| levels.box_of(i)).collect();
     if levels.has_top() {
         let top = top_level(&root_boxes, levels.nodes.len() as u32);
