@@ -3,7 +3,7 @@
 use crate::gpu_struct;
 use crate::scene::gpu_types::CameraView;
 use crate::scene::{Camera, Projection};
-use glam::{Mat4, UVec2, Vec3};
+use glam::{Mat4, UVec2, Vec2, Vec3};
 
 gpu_struct! {
 /// One frame, as `shaders/scene/bindings.wgsl` declares it.
@@ -42,14 +42,18 @@ pub struct Frame {
     pub pixel_filter: u32,
     /// Root of the top-level BVH in `nodes`.
     pub top_level: u32,
+    /// Cosine and sine of the turn of environment and sun about +Y.
+    pub environment_turn: Vec2,
+    /// The same in the previous frame.
+    pub previous_environment_turn: Vec2,
+    /// Index of the sun among the lights, or `NONE`.
+    pub sun_light: u32,
     /// 0 by ray cones, 1 always the finest.
     pub texture_levels: u32,
     /// Unused.
     pub padding_0: u32,
     /// Unused.
     pub padding_1: u32,
-    /// Unused.
-    pub padding_2: u32,
 }
 }
 

@@ -1,14 +1,19 @@
 //! The uploaded scene: the buffers and textures of bind group 0, all but the frame uniform.
 
+use crate::environment_pyramid::EnvironmentPyramid;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::data_texture::DataTexture;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
-use crate::scene::FlatScene;
-use crate::scene::flat::{FlatInstance, TextureArray, levels};
-use crate::scene::gpu_types::{BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK};
-use glam::{Mat4, Quat, Vec3, Vec4};
+use crate::pace::{Pace, SLICE_BYTES};
+use crate::scene::flat::{FlatEnvironment, FlatInstance, TextureArray, levels};
+use crate::scene::gpu_types::{
+    BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, MATERIAL_UNLIT, MATERIAL_VOLUME,
+    MaterialExtensions, NONE, TRIANGLE_ALPHA_MASK,
+};
+use crate::scene::{FlatScene, Shape};
+use glam::{Mat4, Quat, UVec2, Vec3, Vec4};
 
 /// Triangles in the first of the two buffers: 128 MiB, what every WebGPU device can bind. As in `shaders/scene/data.wgsl`.
 const FIRST_TRIANGLES: usize = (128 << 20) / size_of::<crate::scene::gpu_types::Triangle>();
@@ -25,6 +30,7 @@ pub struct GpuScene {
     lights: wgpu::Buffer,
     attributes: DataTexture,
     materials: DataTexture,
+    material_extensions: DataTexture,
     instances: DataTexture,
     /// Object to world of each instance in the frame that is uploaded.
     transforms: Vec<Mat4>,
@@ -33,6 +39,10 @@ pub struct GpuScene {
     textures: [wgpu::TextureView; TEXTURE_ARRAYS.len()],
     environment_radiance: wgpu::TextureView,
     environment_alias: wgpu::TextureView,
+    /// What stands in for a pyramid that there is not.
+    no_pyramid: wgpu::TextureView,
+    /// Made when the environment is to be sampled by it.
+    pyramid: Option<EnvironmentPyramid>,
     /// The punctual lights as they are uploaded now, from `first_punctual` on.
     punctual: Vec<Light>,
     first_punctual: u32,
@@ -45,7 +55,16 @@ impl GpuScene {
     ///
     /// # Errors
     /// `LIMIT`, with numbers, where the device is too small for it.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn new(gpu: &Gpu, scene: &FlatScene) -> Result<Self> {
+        pollster::block_on(Self::upload(gpu, scene, &mut Pace::unbroken()))
+    }
+
+    /// Uploads a scene, in slices.
+    ///
+    /// # Errors
+    /// As [`GpuScene::new`].
+    pub async fn upload(gpu: &Gpu, scene: &FlatScene, pace: &mut Pace) -> Result<Self> {
         let limits = gpu.device.limits();
         let texture_limit = |what: &str, wanted: u32, had: u32, unit: &'static str| {
             if wanted > had {
@@ -71,39 +90,55 @@ impl GpuScene {
         let point = [bytemuck::Zeroable::zeroed()];
         let transforms: Vec<Mat4> = scene.instances.iter().map(|i| i.transform).collect();
         let first = scene.first_punctual as usize;
-        let punctual: Vec<Light> =
-            scene.lights.iter().skip(first).filter(|l| l.kind != LIGHT_ENVIRONMENT).copied().collect();
+        let punctual: Vec<Light> = scene.lights.iter().skip(first).filter(|l| !is_distant(l)).copied().collect();
         Ok(GpuScene {
-            nodes: gpu.storage_of("nodes", &scene.nodes)?,
+            nodes: gpu.storage_in_slices("nodes", &scene.nodes, pace).await?,
             triangles: [
-                gpu.storage_of("triangles", first_triangles)?,
-                gpu.storage_of("the triangles after the first 2796202", if rest.is_empty() { &point } else { rest })?,
+                gpu.storage_in_slices("triangles", first_triangles, pace).await?,
+                gpu.storage_in_slices(
+                    "the triangles after the first 2796202",
+                    if rest.is_empty() { &point } else { rest },
+                    pace,
+                )
+                .await?,
             ],
-            attributes: DataTexture::new(gpu, "attributes", &scene.attributes)?,
+            attributes: DataTexture::in_slices(gpu, "attributes", &scene.attributes, pace).await?,
             materials: DataTexture::new(gpu, "materials", &scene.materials)?,
+            material_extensions: DataTexture::new(gpu, "material extensions", &scene.material_extensions)?,
             instances: DataTexture::new(gpu, "instances", &instance_records(scene, &transforms, &transforms))?,
             transforms,
             top_level: scene.root(),
             lights: if scene.lights.is_empty() {
                 gpu.storage("lights", std::mem::size_of::<Light>() as u64)?
             } else {
-                gpu.storage_of("lights", &scene.lights)?
+                gpu.storage_in_slices("lights", &scene.lights, pace).await?
             },
-            textures: std::array::from_fn(|i| texture_array(gpu, TEXTURE_ARRAYS[i], scene.textures.get(i))),
+            textures: [
+                texture_array(gpu, TEXTURE_ARRAYS[0], scene.textures.first(), pace).await,
+                texture_array(gpu, TEXTURE_ARRAYS[1], scene.textures.get(1), pace).await,
+                texture_array(gpu, TEXTURE_ARRAYS[2], scene.textures.get(2), pace).await,
+                texture_array(gpu, TEXTURE_ARRAYS[3], scene.textures.get(3), pace).await,
+            ],
             environment_radiance: upload(
                 gpu,
                 "environment radiance",
                 size,
                 wgpu::TextureFormat::Rgba32Float,
                 bytemuck::cast_slice(radiance),
-            ),
+                pace,
+            )
+            .await,
             environment_alias: upload(
                 gpu,
                 "environment alias table",
                 size,
                 wgpu::TextureFormat::Rgba32Uint,
                 bytemuck::cast_slice(alias),
-            ),
+                pace,
+            )
+            .await,
+            no_pyramid: gpu.texture("no pyramid", UVec2::ONE, wgpu::TextureFormat::Rgba32Float),
+            pyramid: None,
             rest_positions: punctual.iter().map(|l| l.position).collect(),
             punctual,
             first_punctual: scene.first_punctual,
@@ -129,6 +164,31 @@ impl GpuScene {
         }
         let offset = u64::from(self.first_punctual) * std::mem::size_of::<Light>() as u64;
         gpu.queue.write_buffer(&self.lights, offset, bytemuck::cast_slice(&self.punctual));
+    }
+
+    /// Whether the environment is sampled by its pyramid, which [`GpuScene::record`] then makes, or by its alias table.
+    pub fn sample_by_pyramid(&mut self, gpu: &Gpu, by_pyramid: bool) {
+        let size = self.environment_radiance.texture().size();
+        if !by_pyramid || !self.features.environment {
+            self.pyramid = None;
+        } else if self.pyramid.is_none() {
+            self.pyramid = Some(EnvironmentPyramid::new(gpu, size.width, size.height));
+        }
+        self.features.environment_pyramid = self.pyramid.is_some();
+    }
+
+    /// Replaces the environment's radiance and alias table by those of a map of the same size.
+    pub(crate) fn update_environment(&self, gpu: &Gpu, environment: &FlatEnvironment) {
+        write_rows(gpu, self.environment_radiance.texture(), [0; 3], bytemuck::cast_slice(&environment.radiance));
+        write_rows(gpu, self.environment_alias.texture(), [0; 3], bytemuck::cast_slice(&environment.alias));
+    }
+
+    /// What has to be made before the scene can be rendered.
+    ///
+    /// # Errors
+    /// `SHADER` where [`GpuScene::share`] was not called.
+    pub fn record(&self, recorder: &mut Recorder<'_>) -> Result<()> {
+        self.pyramid.as_ref().map_or(Ok(()), |pyramid| pyramid.record(recorder))
     }
 
     /// Moves the instances: `transforms` is object to world of each. The top level is rebuilt over them; where they stood
@@ -172,16 +232,20 @@ impl GpuScene {
         recorder.share("lights", &self.lights);
         recorder.share("attributes", &self.attributes.view);
         recorder.share("materials", &self.materials.view);
+        recorder.share("material_extensions", &self.material_extensions.view);
         recorder.share("instances", &self.instances.view);
         for (name, textures) in TEXTURE_ARRAYS.into_iter().zip(&self.textures) {
             recorder.share(name, textures);
         }
         recorder.share("environment_radiance", &self.environment_radiance);
         recorder.share("environment_alias", &self.environment_alias);
+        let pyramid = self.pyramid.as_ref().map_or(&self.no_pyramid, |pyramid| &pyramid.view);
+        recorder.share("environment_pyramid", pyramid);
     }
 }
 
 fn features(scene: &FlatScene) -> SceneFeatures {
+    let any = |has: fn(&MaterialExtensions) -> bool| scene.material_extensions.iter().any(has);
     SceneFeatures {
         textures: !scene.textures.is_empty(),
         textures_1: scene.textures.len() > 1,
@@ -189,9 +253,30 @@ fn features(scene: &FlatScene) -> SceneFeatures {
         textures_3: scene.textures.len() > 3,
         alpha_masks: scene.triangles.iter().any(|t| t.flags & TRIANGLE_ALPHA_MASK != 0),
         environment: environment_light(scene) != NONE,
-        punctual_lights: scene.lights.iter().any(|l| l.kind != LIGHT_TRIANGLE && l.kind != LIGHT_ENVIRONMENT),
+        sun: sun_light(scene) != NONE,
+        environment_pyramid: false,
+        shapes: scene.triangles.iter().any(|t| t.shape() != Shape::Triangles),
+        punctual_lights: scene.lights.iter().any(|l| l.kind != LIGHT_TRIANGLE && !is_distant(l)),
         instances: scene.has_top_level(),
         many_triangles: scene.triangles.len() > FIRST_TRIANGLES,
+        transmission: any(|m| m.transmission > 0.0),
+        volumes: any(|m| m.flags & MATERIAL_VOLUME != 0),
+        dispersion: any(|m| m.flags & MATERIAL_VOLUME != 0 && m.dispersion > 0.0),
+        unlit: any(|m| m.flags & MATERIAL_UNLIT != 0),
+        anisotropy: any(|m| m.anisotropy > 0.0),
+        // Where a medium is outside, index 1.5 reflects something else.
+        specular: any(|m| {
+            m.ior != 1.5
+                || m.specular != 1.0
+                || m.specular_color != Vec3::ONE
+                || m.slots()[..2].iter().any(|slot| slot.read().is_some())
+                || m.flags & MATERIAL_VOLUME != 0
+        }),
+        sheen: any(|m| m.sheen_color != Vec3::ZERO),
+        clearcoat: any(|m| m.clearcoat > 0.0),
+        iridescence: any(|m| m.iridescence > 0.0),
+        energy_compensation: false,
+        conserving_mix: false,
     }
 }
 
@@ -210,14 +295,26 @@ fn instance_records(scene: &FlatScene, transforms: &[Mat4], previous: &[Mat4]) -
 
 /// Index of the environment among the lights, or `NONE`.
 pub fn environment_light(scene: &FlatScene) -> u32 {
-    match scene.lights.last() {
-        Some(light) if light.kind == LIGHT_ENVIRONMENT => scene.lights.len() as u32 - 1,
-        _ => NONE,
-    }
+    distant_light(scene, LIGHT_ENVIRONMENT)
+}
+
+/// Index of the sun among the lights, or `NONE`.
+pub fn sun_light(scene: &FlatScene) -> u32 {
+    distant_light(scene, LIGHT_SUN)
+}
+
+fn is_distant(light: &Light) -> bool {
+    matches!(light.kind, LIGHT_SUN | LIGHT_ENVIRONMENT)
+}
+
+/// Distant lights are the last.
+fn distant_light(scene: &FlatScene, kind: u32) -> u32 {
+    let last = scene.lights.iter().enumerate().rev().take_while(|(_, light)| is_distant(light));
+    last.into_iter().find(|(_, light)| light.kind == kind).map_or(NONE, |(index, _)| index as u32)
 }
 
 /// An array with all its levels; one white texel for an array that the scene does not have.
-fn texture_array(gpu: &Gpu, label: &str, array: Option<&TextureArray>) -> wgpu::TextureView {
+async fn texture_array(gpu: &Gpu, label: &str, array: Option<&TextureArray>, pace: &mut Pace) -> wgpu::TextureView {
     let format = wgpu::TextureFormat::Rgba8Unorm;
     let texture = match array {
         Some(array) => {
@@ -226,14 +323,14 @@ fn texture_array(gpu: &Gpu, label: &str, array: Option<&TextureArray>) -> wgpu::
                 for layer in 0..array.layers {
                     let start = array.offset(level, layer, 0, 0);
                     let end = start + array.layer_bytes(level) as usize;
-                    write(gpu, &texture, level, layer, array.texels.get(start..end).unwrap_or_default());
+                    write(gpu, &texture, level, layer, array.texels.get(start..end).unwrap_or_default(), pace).await;
                 }
             }
             texture
         }
         None => {
             let texture = create(gpu, label, [1; 3], 1, format);
-            write(gpu, &texture, 0, 0, &[u8::MAX; 4]);
+            write(gpu, &texture, 0, 0, &[u8::MAX; 4], pace).await;
             texture
         }
     };
@@ -243,9 +340,16 @@ fn texture_array(gpu: &Gpu, label: &str, array: Option<&TextureArray>) -> wgpu::
     })
 }
 
-fn upload(gpu: &Gpu, label: &str, size: [u32; 2], format: wgpu::TextureFormat, texels: &[u8]) -> wgpu::TextureView {
+async fn upload(
+    gpu: &Gpu,
+    label: &str,
+    size: [u32; 2],
+    format: wgpu::TextureFormat,
+    texels: &[u8],
+    pace: &mut Pace,
+) -> wgpu::TextureView {
     let texture = create(gpu, label, [size[0], size[1], 1], 1, format);
-    write(gpu, &texture, 0, 0, texels);
+    write(gpu, &texture, 0, 0, texels, pace).await;
     texture.create_view(&Default::default())
 }
 
@@ -263,19 +367,93 @@ fn create(gpu: &Gpu, label: &str, size: [u32; 3], levels: u32, format: wgpu::Tex
     })
 }
 
-/// Writes one layer of one level, so that no staging copy is larger than that.
-fn write(gpu: &Gpu, texture: &wgpu::Texture, level: u32, layer: u32, texels: &[u8]) {
-    let (width, height) = ((texture.width() >> level).max(1), (texture.height() >> level).max(1));
-    let row = width * texture.format().block_copy_size(None).unwrap_or(4);
+/// Writes one layer of one level, a few rows at once, so that no staging copy is large.
+async fn write(gpu: &Gpu, texture: &wgpu::Texture, level: u32, layer: u32, texels: &[u8], pace: &mut Pace) {
+    let row = row_bytes(texture, level) as usize;
+    let rows = (SLICE_BYTES / row).max(1);
+    for (part, y) in texels.chunks(row * rows).zip((0..).step_by(rows)) {
+        write_rows(gpu, texture, [level, layer, y], part);
+        pace.breathe().await;
+    }
+}
+
+fn row_bytes(texture: &wgpu::Texture, level: u32) -> u32 {
+    (texture.width() >> level).max(1) * texture.format().block_copy_size(None).unwrap_or(4)
+}
+
+/// Writes whole rows from row `y` of a layer of a level on.
+fn write_rows(gpu: &Gpu, texture: &wgpu::Texture, [level, layer, y]: [u32; 3], texels: &[u8]) {
+    let row = row_bytes(texture, level);
+    let height = texels.len() as u32 / row;
     gpu.queue.write_texture(
         wgpu::TexelCopyTextureInfo {
             texture,
             mip_level: level,
-            origin: wgpu::Origin3d { x: 0, y: 0, z: layer },
+            origin: wgpu::Origin3d { x: 0, y, z: layer },
             aspect: wgpu::TextureAspect::All,
         },
         texels,
         wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: Some(height) },
-        wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        wgpu::Extent3d { width: (texture.width() >> level).max(1), height, depth_or_array_layers: 1 },
     );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Clearcoat, Iridescence, Material, Scene, Sheen, Specular, Transmission, Volume, shapes};
+
+    /// Each extension puts in the code that it needs, and a scene without any puts in none.
+    #[test]
+    fn kernels_carry_what_materials_need() {
+        let of = |material: Material| {
+            let mesh = shapes::parallelogram(Vec3::ZERO, Vec3::X, Vec3::Y, 0);
+            let instances = vec![crate::scene::Instance { mesh: 0, transform: Mat4::IDENTITY }];
+            let scene = Scene { meshes: vec![mesh], instances, materials: vec![material], ..Scene::default() };
+            features(&FlatScene::build(&scene, &mut |_, _| ()).expect("a good scene"))
+        };
+        let plain = Material::default();
+        let none = SceneFeatures::NONE;
+        assert_eq!(of(plain.clone()), none);
+        let transmission = Transmission { factor: 0.1, texture: None };
+        let volume = Some(Volume { attenuation_distance: 1.0, attenuation_color: Vec3::ONE });
+        for (material, expected) in [
+            (Material { ior: 1.4, ..plain.clone() }, SceneFeatures { specular: true, ..none }),
+            (
+                Material { specular: Specular { strength: 0.5, ..Specular::default() }, ..plain.clone() },
+                SceneFeatures { specular: true, ..none },
+            ),
+            (Material { transmission, ..plain.clone() }, SceneFeatures { transmission: true, ..none }),
+            (
+                Material { transmission, volume, ..plain.clone() },
+                SceneFeatures { transmission: true, volumes: true, specular: true, ..none },
+            ),
+            (
+                Material { transmission, volume, dispersion: 0.1, ..plain.clone() },
+                SceneFeatures { transmission: true, volumes: true, specular: true, dispersion: true, ..none },
+            ),
+            (Material { unlit: true, ..plain.clone() }, SceneFeatures { unlit: true, ..none }),
+            (
+                Material { sheen: Sheen { color: Vec3::X, ..Sheen::default() }, ..plain.clone() },
+                SceneFeatures { sheen: true, ..none },
+            ),
+            (
+                Material { clearcoat: Clearcoat { factor: 0.1, ..Clearcoat::default() }, ..plain.clone() },
+                SceneFeatures { clearcoat: true, ..none },
+            ),
+            (
+                Material { iridescence: Iridescence { factor: 0.1, ..Iridescence::default() }, ..plain.clone() },
+                SceneFeatures { iridescence: true, ..none },
+            ),
+            (
+                Material {
+                    anisotropy: crate::scene::Anisotropy { strength: 0.1, ..Default::default() },
+                    ..plain.clone()
+                },
+                SceneFeatures { anisotropy: true, ..none },
+            ),
+        ] {
+            assert_eq!(of(material), expected);
+        }
+    }
 }

@@ -4,6 +4,7 @@
 //! [`Renderer`] that holds one of each.
 
 mod describe;
+mod environment_pyramid;
 pub mod error;
 pub mod film;
 pub mod frame;
@@ -11,6 +12,7 @@ pub mod gpu;
 pub mod gpu_scene;
 pub mod lab;
 pub mod output;
+pub mod pace;
 pub mod params;
 pub mod renderer;
 pub mod scene;
@@ -36,6 +38,7 @@ pub fn gpu_layouts() -> Vec<scene::gpu_types::Layout> {
         types::Instance::LAYOUT,
         types::TextureSlot::LAYOUT,
         types::Material::LAYOUT,
+        types::MaterialExtensions::LAYOUT,
         types::Light::LAYOUT,
         types::CameraView::LAYOUT,
         frame::Frame::LAYOUT,

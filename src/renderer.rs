@@ -6,18 +6,23 @@ use crate::frame::{Frame, camera_view};
 use crate::gpu::Gpu;
 use crate::gpu::recorder::{PassTime, Recorder, Timer};
 use crate::gpu::shader::table;
-use crate::gpu_scene::{GpuScene, environment_light};
+use crate::gpu_scene::{GpuScene, environment_light, sun_light};
 use crate::output::Image;
+use crate::pace::Pace;
 use crate::params::{FilmParams, Params, RenderParams};
-use crate::scene::{Camera, FlatScene};
+use crate::scene::flat::environment;
+use crate::scene::{Camera, Environment, FlatScene};
 use crate::techniques::{self, Technique};
-use glam::UVec2;
+use glam::{UVec2, Vec2};
 
 /// Debug views that every technique has; the first is the picture itself.
 pub const COMMON_VIEWS: &[&str] = &["radiance", "albedo", "normal", "depth"];
 
 /// `Frame::view` of the common views after the first, as `shaders/film/view.wgsl` numbers them.
 const FIRST_COMMON_VIEW: u32 = 1000;
+
+/// Value of `environment_sampling`.
+const ENVIRONMENT_BY_PYRAMID: u32 = 1;
 
 /// Seconds of scene time between two frames.
 const FRAME_TIME: f32 = 1.0 / 60.0;
@@ -61,6 +66,8 @@ pub struct Renderer {
     display_timer: Option<Timer>,
     render_params: RenderParams,
     film_params: FilmParams,
+    /// Whether the environment was updated since its alias table was built.
+    alias_is_stale: bool,
     camera: Camera,
     /// The camera of the frame before, if its technique left a history.
     previous_camera: Option<Camera>,
@@ -70,6 +77,7 @@ pub struct Renderer {
     frame_index: u32,
     /// Scene time in steps of [`FRAME_TIME`]. It stands still while frames are accumulated.
     moment: u32,
+    previous_moment: u32,
     accumulated: u32,
     restart_film: bool,
     /// One line for each shader whose last edit did not compile (debug builds).
@@ -81,8 +89,17 @@ impl Renderer {
     ///
     /// # Errors
     /// `LIMIT`, with numbers, where the device is too small.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn new(gpu: Gpu, scene: FlatScene, size: UVec2) -> Result<Self> {
-        let gpu_scene = GpuScene::new(&gpu, &scene)?;
+        pollster::block_on(Self::prepare(gpu, scene, size, &mut Pace::unbroken()))
+    }
+
+    /// As [`Renderer::new`], in slices; on the web there is only this.
+    ///
+    /// # Errors
+    /// `LIMIT`, with numbers, where the device is too small.
+    pub async fn prepare(gpu: Gpu, scene: FlatScene, size: UVec2, pace: &mut Pace) -> Result<Self> {
+        let gpu_scene = GpuScene::upload(&gpu, &scene, pace).await?;
         let film = Film::new(&gpu, size)?;
         let camera = scene.cameras.first().cloned().ok_or_else(|| Error::bad_value("scene", "has no camera"))?;
         let technique = (techniques::ALL[0].create)(&gpu);
@@ -100,6 +117,7 @@ impl Renderer {
             display_timer: Timer::new(&gpu),
             render_params: RenderParams::default(),
             film_params: FilmParams::default(),
+            alias_is_stale: false,
             camera,
             previous_camera: None,
             view: 0,
@@ -107,6 +125,7 @@ impl Renderer {
             accumulate: scene.motions.is_empty(),
             frame_index: 0,
             moment: 0,
+            previous_moment: 0,
             accumulated: 0,
             restart_film: true,
             shader_problems: Vec::new(),
@@ -161,11 +180,21 @@ impl Renderer {
     ///
     /// # Errors
     /// As [`Renderer::new`].
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn set_scene(&mut self, scene: FlatScene) -> Result<()> {
+        pollster::block_on(self.change_scene(scene, &mut Pace::unbroken()))
+    }
+
+    /// As [`Renderer::set_scene`], in slices; on the web there is only this.
+    ///
+    /// # Errors
+    /// As [`Renderer::set_scene`].
+    pub async fn change_scene(&mut self, scene: FlatScene, pace: &mut Pace) -> Result<()> {
         let camera = scene.cameras.first().cloned().ok_or_else(|| Error::bad_value("scene", "has no camera"))?;
-        let gpu_scene = GpuScene::new(&self.gpu, &scene)?;
+        let gpu_scene = GpuScene::upload(&self.gpu, &scene, pace).await?;
         self.gpu.check()?;
         self.gpu_scene = gpu_scene;
+        self.alias_is_stale = false;
         self.accumulate = scene.motions.is_empty();
         self.scene = scene;
         self.camera = camera;
@@ -274,6 +303,40 @@ impl Renderer {
         self.restart_film = true;
     }
 
+    /// Gives the environment other texels, for one that is streamed live. Frames go on being accumulated, and techniques
+    /// keep their history. With `render.environment_sampling` at `pyramid` nothing else is needed; at `alias` the next
+    /// frame waits for a table that the CPU builds.
+    ///
+    /// # Errors
+    /// `BAD_VALUE` where the map has another size than the scene's, is black, or has a negative or infinite radiance.
+    pub fn update_environment(&mut self, environment: &Environment) -> Result<()> {
+        let bad = |what: &str| Error::bad_value("environment", what);
+        let radiance = environment::texels(environment)?.ok_or_else(|| bad("it is black"))?;
+        match &mut self.scene.environment {
+            Some(current) if (current.width, current.height) == (environment.width, environment.height) => {
+                current.radiance = radiance;
+                self.gpu_scene.update_environment(&self.gpu, current);
+                self.alias_is_stale = true;
+                Ok(())
+            }
+            Some(current) => Err(bad(&format!("it has other sides than {} x {}", current.width, current.height))),
+            None => Err(bad("the scene has none to be replaced")),
+        }
+    }
+
+    /// Prepares the way in which the environment is sampled.
+    fn prepare_environment(&mut self) {
+        let by_pyramid = self.render_params.environment_sampling == ENVIRONMENT_BY_PYRAMID;
+        self.gpu_scene.sample_by_pyramid(&self.gpu, by_pyramid);
+        if !by_pyramid
+            && std::mem::take(&mut self.alias_is_stale)
+            && let Some(environment) = &mut self.scene.environment
+        {
+            environment.build_alias();
+            self.gpu_scene.update_environment(&self.gpu, environment);
+        }
+    }
+
     /// Sets the seed of all random numbers and starts again.
     pub fn set_seed(&mut self, seed: u32) {
         self.seed = seed;
@@ -326,6 +389,7 @@ impl Renderer {
             self.technique_ready = true;
         }
         self.advance_time();
+        self.prepare_environment();
         self.gpu.queue.write_buffer(&self.frame_uniform, 0, bytemuck::bytes_of(&self.frame()));
         self.film.prepare(&self.gpu, &self.film_params, self.view != 0);
 
@@ -338,8 +402,10 @@ impl Renderer {
         // Rays are counted by the frame, what was left out since the film began.
         recorder.encoder.clear_buffer(&self.film.counters, 0, if restart { None } else { Some(4) });
         self.gpu_scene.share(&mut recorder);
+        self.render_params.specialise(&mut recorder.features);
         self.film.share(&mut recorder);
         recorder.share("frame", &self.frame_uniform);
+        self.gpu_scene.record(&mut recorder)?;
         recorder.share("visibility", &self.visibility[parity]);
         recorder.share("previous_visibility", &self.visibility[1 - parity]);
         recorder.pass(&table::SCENE_VISIBILITY).bind("visibility_out", &self.visibility[parity]).dispatch_over(size)?;
@@ -369,11 +435,11 @@ impl Renderer {
         if self.frame_index == 0 {
             self.moment = 0;
         }
-        let previous = self.moment;
+        self.previous_moment = self.moment;
         if self.frame_index > 0 && !self.accumulate {
             self.moment = self.moment.wrapping_add(1);
         }
-        let [previous, now] = [previous, self.moment].map(|moment| moment as f32 * FRAME_TIME);
+        let [previous, now] = [self.previous_moment, self.moment].map(|moment| moment as f32 * FRAME_TIME);
         self.gpu_scene.animate(&self.gpu, &self.scene, previous, now);
     }
 
@@ -388,6 +454,13 @@ impl Renderer {
         self.film.record_display(&mut recorder, &self.film_params)?;
         recorder.submit();
         self.gpu.check()
+    }
+
+    /// Cosine and sine of the turn of environment and sun at a moment.
+    fn environment_turn(&self, moment: u32) -> Vec2 {
+        let RenderParams { environment_rotation, environment_rotation_rate, .. } = self.render_params;
+        let degrees = environment_rotation + environment_rotation_rate * (moment as f32 * FRAME_TIME);
+        Vec2::from_angle((degrees % 360.0).to_radians())
     }
 
     fn frame(&self) -> Frame {
@@ -413,9 +486,11 @@ impl Renderer {
             pixel_filter: self.render_params.pixel_filter,
             top_level: self.gpu_scene.top_level(),
             texture_levels: self.render_params.texture_levels,
+            sun_light: sun_light(&self.scene),
+            environment_turn: self.environment_turn(self.moment),
+            previous_environment_turn: self.environment_turn(self.previous_moment),
             padding_0: 0,
             padding_1: 0,
-            padding_2: 0,
         }
     }
 
@@ -468,6 +543,7 @@ impl Renderer {
     pub async fn read_auxiliary(&self) -> Result<Auxiliary> {
         let mut recorder = Recorder::new(&self.gpu, None);
         self.gpu_scene.share(&mut recorder);
+        self.render_params.specialise(&mut recorder.features);
         recorder.share("frame", &self.frame_uniform);
         recorder.share("visibility", &self.visibility[(self.frame_index.wrapping_sub(1) & 1) as usize]);
         record_auxiliary(&mut recorder, &self.albedo_depth, &self.normal, self.size())?;

@@ -288,13 +288,24 @@ fn compare_refuses_what_it_cannot_compare() {
 #[test]
 fn clamped_environments_are_warned_of() {
     let folder = Folder::new("clamped");
-    let (sky, out) = (exr(&folder, "sky.exr", 4, 2, f32::NAN), folder.path("a.png"));
+    let (sky, out) = (exr(&folder, "sky.exr", 4, 2, f32::INFINITY), folder.path("a.png"));
     let args = ["render", "builtin:cornell", "--environment", &sky, "--size", "16x8", "--frames", "1", "--out", &out];
     let output = restir(&args);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert!(stderr(&output).contains("24 values were not within 0 and 1e8"), "{}", stderr(&output));
     let report = succeed_json(&[&args[..], &["--json"]].concat());
     assert!(report["warnings"][0].as_str().unwrap().contains("24 values"), "{report}");
+
+    let nan = exr(&folder, "nan.exr", 4, 2, f32::NAN);
+    let args = ["render", "builtin:cornell", "--environment", &nan, "--out", &out];
+    fail(&args, 1, "BAD_FILE", "24 of 24 values");
+    fail(
+        &["render", "builtin:cornell", "--environment", "sky:height=1", "--out", &out],
+        2,
+        "UNKNOWN_NAME",
+        "elevation",
+    );
+    fail(&["render", "builtin:cornell", "--environment", "sky:albedo=2", "--out", &out], 2, "BAD_VALUE", "albedo");
 }
 
 #[test]

@@ -3,13 +3,13 @@ import { findAdapter } from './adapter.js';
 import type { Camera, Description, SceneReport, Stats, TechniqueInfo } from './api.js';
 import { OrbitCamera } from './camera.js';
 import { Controls } from './controls.js';
-import { acceptDrops, readFiles } from './files.js';
+import { acceptDrops, readDropped, surroundingsOf } from './files.js';
 import { SceneLoader } from './loader.js';
 import { toFailure } from './messages.js';
 import { byId, clearError, showError, showProgress, showStatus, showWarnings } from './notices.js';
 import { type Group, fillMenu, isDefault, showPanel } from './panel.js';
 import init, { Viewer, describe } from './pkg/restir.js';
-import type { SceneSource } from './protocol.js';
+import type { Choice, Contents, Loaded, SceneSource, Surroundings } from './protocol.js';
 import { RenderLoop } from './render-loop.js';
 import { Resolution } from './resolution.js';
 import { readQuery, writeQuery } from './url-state.js';
@@ -20,6 +20,12 @@ const defaultTechnique = 'restir-di';
 const defaultScene = 'cornell';
 /** Milliseconds between read-backs of counters and timings. */
 const statsInterval = 500;
+const environments: [string, string][] = [
+  ['', 'of the scene'],
+  ['sky', 'sun and sky'],
+  ['sky:elevation=6,turbidity=3', 'low sun'],
+  ['white', 'even white'],
+];
 const scales: [string, string][] = [
   ['', 'automatic'],
   ['0.25', '¼'],
@@ -42,6 +48,9 @@ class App {
   private readonly state = this.query.state;
   private description: Description | undefined;
   private viewer: Viewer | undefined;
+  /** What is shown, to be read again under another environment. */
+  private source: SceneSource = { kind: 'builtin', name: this.state.scene ?? defaultScene };
+  private surroundings = this.state.environment === undefined ? undefined : surroundingsOf(this.state.environment);
   /** The scene as the worker made it: a lost device is rebuilt from it. */
   private flat: Uint8Array | undefined;
   private cameras: Camera[] = [];
@@ -62,7 +71,7 @@ class App {
     this.resolution.fixedSize = this.state.size;
     this.resolution.fixedScale = this.state.scale;
     try {
-      const scene = this.flatten(this.firstSource());
+      const scene = this.flatten(this.source, this.surroundings);
       scene.catch(() => undefined);
       const [adapter, module] = await Promise.all([findAdapter(), this.compiled]);
       this.resolution.startAt(adapter.software ? 0.25 : 1);
@@ -70,54 +79,84 @@ class App {
       this.description = JSON.parse(describe()) as Description;
       this.listen();
       this.showMenus();
-      await this.open(this.firstSource(), scene);
-      if (!this.flat) await this.open({ kind: 'builtin', name: defaultScene });
+      const problem = await this.open(this.source, this.surroundings, scene);
+      // Without what could not be had: first the environment, then the scene.
+      if (!this.flat && this.surroundings) await this.open(this.source, undefined);
+      if (!this.flat) await this.open({ kind: 'builtin', name: defaultScene }, undefined);
+      if (problem) showError(problem);
     } catch (error) {
       showProgress(undefined);
       showError(error, { final: true });
     }
   }
 
-  private firstSource(): SceneSource {
-    return { kind: 'builtin', name: this.state.scene ?? defaultScene };
-  }
-
   // Scenes
 
-  private flatten(source: SceneSource): Promise<Uint8Array> {
-    return this.loader.load(this.compiled, { source, lights: this.state.lights, seed: this.state.seed }, showProgress);
+  private flatten(source: SceneSource, surroundings: Surroundings | undefined): Promise<Loaded> {
+    const { lights, seed } = this.state;
+    return this.loader.load(this.compiled, { source, surroundings, lights, seed }, showProgress);
   }
 
-  /** Shows a scene, or says why not and keeps the former one. */
-  private async open(source: SceneSource, flat = this.flatten(source)): Promise<void> {
+  /**
+   * Shows a scene, or says why not and keeps the former one. With `keepView` the camera stays where it is. Resolves to what
+   * went wrong, if anything did.
+   */
+  private async open(
+    source: SceneSource,
+    surroundings: Surroundings | undefined,
+    loading = this.flatten(source, surroundings),
+    keepView = source === this.source,
+  ): Promise<unknown> {
+    let problem: unknown;
     try {
-      const bytes = await flat;
-      showProgress(1, 'Starting the renderer');
-      if (this.viewer) await this.loop.change((viewer) => this.replaceScene(viewer, bytes));
-      else await this.createViewer(bytes);
-      this.flat = bytes;
+      const { flat, contents } = await loading;
+      showProgress(1, 'Starting the renderer', { cancellable: false });
+      if (this.viewer) await this.loop.change((viewer) => this.replaceScene(viewer, flat, keepView));
+      else await this.createViewer(flat);
+      this.flat = flat;
+      this.source = source;
+      this.surroundings = surroundings;
+      this.state.environment = surroundings?.bytes ? undefined : surroundings?.name;
       this.state.scene = source.kind === 'builtin' ? source.name : undefined;
       clearError();
+      this.showContents(source, contents);
       this.writeUrl();
     } catch (error) {
-      showError(error);
+      problem = error;
+      // A load that made way for another leaves the bar to that.
+      if (toFailure(error).code === 'CANCELLED' && this.loader.busy) return problem;
+      if (toFailure(error).code !== 'CANCELLED') showError(error);
     }
-    this.showSceneMenu(source);
+    this.showSceneMenu(this.source);
+    this.showEnvironmentMenu();
     showProgress(undefined);
+    return problem;
   }
 
   private async openFiles(files: File[]): Promise<void> {
     try {
-      await this.open(await readFiles(files));
+      const { source = this.source, surroundings = this.surroundings } = await readDropped(files);
+      await this.open(source, surroundings);
     } catch (error) {
       showError(error);
     }
   }
 
-  private replaceScene(viewer: Viewer, flat: Uint8Array): void {
-    viewer.load(flat);
-    this.state.camera = '0';
-    this.state.pose = undefined;
+  /** Loads the same file again with another choice. */
+  private async choose(choice: Choice): Promise<void> {
+    const { source, surroundings } = this;
+    if (source.kind !== 'file') return;
+    const chosen = { ...source, choice: { ...source.choice, ...choice } };
+    await this.open(chosen, surroundings, this.flatten(chosen, surroundings), choice.scene === undefined);
+  }
+
+  private async replaceScene(viewer: Viewer, flat: Uint8Array, keepView: boolean): Promise<void> {
+    await viewer.load(flat);
+    if (keepView) this.state.pose = this.orbit.toCamera();
+    else {
+      this.state.camera = '0';
+      this.state.pose = undefined;
+    }
     this.sceneOpened(viewer);
   }
 
@@ -251,8 +290,29 @@ class App {
     fillMenu(menu('scene'), entries, chosen);
   }
 
+  /** The environment menu after a load; a map stands in it under its name while it is shown. */
+  private showEnvironmentMenu(): void {
+    fillMenu(menu('environment'), environments, this.surroundings?.name ?? '');
+  }
+
+  /** Menus for what can be chosen in the file shown; hidden where there is no choice. */
+  private showContents(source: SceneSource, { scenes, scene, variants }: Contents = { scenes: [], scene: 0, variants: [] }): void {
+    const choice = source.kind === 'file' ? source.choice : {};
+    byId('file-scene-row', HTMLElement).hidden = scenes.length < 2;
+    byId('variant-row', HTMLElement).hidden = variants.length === 0;
+    fillMenu(menu('file-scene'), scenes.map((name, index) => [String(index), name]), String(choice.scene ?? scene));
+    fillMenu(menu('variant'), [['', 'default'], ...variants.map((name): [string, string] => [name, name])], choice.variant ?? '');
+  }
+
   private listen(): void {
-    menu('scene').addEventListener('change', () => void this.open({ kind: 'builtin', name: menu('scene').value }));
+    button('cancel').addEventListener('click', () => this.loader.cancel());
+    menu('file-scene').addEventListener('change', () => void this.choose({ scene: Number(menu('file-scene').value) }));
+    menu('variant').addEventListener('change', () => void this.choose({ variant: menu('variant').value || undefined }));
+    menu('scene').addEventListener('change', () => void this.open({ kind: 'builtin', name: menu('scene').value }, this.surroundings));
+    menu('environment').addEventListener('change', () => {
+      const text = menu('environment').value;
+      void this.open(this.source, text === '' ? undefined : surroundingsOf(text));
+    });
     menu('technique').addEventListener('change', () => this.chooseTechnique(menu('technique').value));
     menu('view').addEventListener('change', () => {
       this.state.view = menu('view').value;

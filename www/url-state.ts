@@ -4,6 +4,8 @@ import type { Camera, Vector } from './api.js';
 export interface PageState {
   /** A built-in scene's name; undefined for a file of the user's. */
   scene: string | undefined;
+  /** What surrounds the scene: `sky...`, `white`, or the address of a map; undefined for its own, or a file of the user's. */
+  environment: string | undefined;
   technique: string;
   view: string;
   seed: number;
@@ -27,6 +29,7 @@ export interface PageState {
 
 export const defaultState = (technique: string): PageState => ({
   scene: 'cornell',
+  environment: undefined,
   technique,
   view: 'radiance',
   seed: 0,
@@ -75,6 +78,7 @@ const poseText = ({ position, forward, up }: NonNullable<PageState['pose']>) =>
 
 const readers: Record<string, (state: PageState, text: string) => void> = {
   scene: (state, text) => (state.scene = text),
+  environment: (state, text) => (state.environment = text),
   technique: (state, text) => (state.technique = text),
   view: (state, text) => (state.view = text),
   seed: (state, text) => (state.seed = integer(text, 0, 0xffffffff)),
@@ -111,6 +115,7 @@ export function writeQuery(state: PageState, technique: string): string {
     if (value !== undefined && value !== standard) query.set(key, String(value));
   };
   put('scene', state.scene, defaults.scene);
+  put('environment', state.environment, defaults.environment);
   put('technique', state.technique, defaults.technique);
   put('view', state.view, defaults.view);
   put('seed', state.seed, defaults.seed);
@@ -122,7 +127,7 @@ export function writeQuery(state: PageState, technique: string): string {
   put('scale', state.scale, undefined);
   put('frames', state.frames, undefined);
   for (const [key, value] of state.values) query.set(key, value);
-  // Commas and colons need no escape in a query, and links are read by people.
-  const text = query.toString().replaceAll('%2C', ',').replaceAll('%3A', ':');
+  // These need no escape in a query, and links are read by people.
+  const text = query.toString().replace(/%2C|%3A|%3D|%2F/g, decodeURIComponent);
   return text && `?${text}`;
 }

@@ -32,10 +32,12 @@ struct Frame {
     history: u32, // 1 if the previous frame's buffers may be read
     pixel_filter: u32, // PIXEL_FILTER_BOX or PIXEL_FILTER_CENTER
     top_level: u32, // root of the top-level BVH in `nodes`
+    environment_turn: vec2f, // cosine and sine of the turn of environment and sun about +Y
+    previous_environment_turn: vec2f, // the same in the previous frame
+    sun_light: u32, // index of the sun in `lights`, or NONE
     texture_levels: u32, // TEXTURE_LEVELS_CONE or TEXTURE_LEVELS_FINEST
     padding_0: u32,
     padding_1: u32,
-    padding_2: u32,
 }
 
 struct BvhNode {
@@ -123,7 +125,12 @@ override scene_has_textures_2: bool = true;
 override scene_has_textures_3: bool = true;
 override scene_has_alpha_masks: bool = true;
 override scene_has_environment: bool = true;
+override scene_has_sun: bool = true;
+// Primitives other than triangles.
+override scene_has_shapes: bool = true;
 override scene_has_punctual_lights: bool = true;
+// How texels of the environment are drawn: by the pyramid of weights, or by the alias table.
+override scene_has_environment_pyramid: bool = true;
 // More than one instance: else there is one, that of what never moves, in world space.
 override scene_has_instances: bool = true;
 // More triangles than one storage binding holds.
@@ -143,3 +150,4 @@ override scene_has_many_triangles: bool = true;
 @group(0) @binding(11) var textures_1: texture_2d_array<f32>;
 @group(0) @binding(12) var textures_2: texture_2d_array<f32>;
 @group(0) @binding(13) var textures_3: texture_2d_array<f32>;
+@group(0) @binding(16) var environment_pyramid: texture_2d<f32>;

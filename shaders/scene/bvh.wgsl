@@ -3,6 +3,7 @@
 // may be inlined.
 #include "scene/data.wgsl"
 #include "scene/texture.wgsl"
+#include "lib/shapes.wgsl"
 
 // The builders guarantee that no path down both levels is longer (src/scene/bvh.rs).
 const BVH_STACK = 84u;
@@ -10,6 +11,7 @@ const BVH_STACK = 84u;
 const TRIANGLE_DOUBLE_SIDED = 1u;
 const TRIANGLE_ALPHA_MASK = 2u;
 const TRIANGLE_TANGENTS = 4u;
+const SHAPE_SHIFT = 28u;
 const BITANGENT_SHIFT = 16u;
 
 struct Hit {
@@ -47,6 +49,41 @@ fn passes_alpha(triangle: u32, uv: vec2f) -> bool {
     return alpha >= material.alpha_cutoff;
 }
 
+fn shape_of(flags: u32) -> u32 {
+    return (flags >> SHAPE_SHIFT) & 3u;
+}
+
+fn is_sphere(flags: u32) -> bool {
+    return scene_has_shapes && shape_of(flags) == SHAPE_SPHERE;
+}
+
+// A primitive that is no triangle. The plane of a flat one as by Möller and Trumbore 1997; it has no neighbours to be
+// watertight with.
+fn intersect_shape(index: u32, instance: u32, triangle: Triangle, origin: vec3f, direction: vec3f,
+    hit: ptr<function, Hit>) {
+    let e1 = triangle.p1 - triangle.p0;
+    let e2 = triangle.p2 - triangle.p0;
+    let s = origin - triangle.p0;
+    if is_sphere(triangle.flags) {
+        let t = enter_sphere(s, direction, length(e1));
+        if t > 0.0 && t < (*hit).t {
+            *hit = Hit(t, index, sphere_uv(normalize(s + t * direction)), instance);
+        }
+        return;
+    }
+    let p = cross(direction, e2);
+    let determinant = dot(e1, p);
+    if determinant <= 0.0 && (determinant == 0.0 || (triangle.flags & TRIANGLE_DOUBLE_SIDED) == 0u) {
+        return;
+    }
+    let q = cross(s, e1);
+    let uv = vec2f(dot(s, p), dot(direction, q)) / determinant;
+    let t = dot(e2, q) / determinant;
+    if t > 0.0 && t < (*hit).t && shape_contains(shape_of(triangle.flags), uv) {
+        *hit = Hit(t, index, uv, instance);
+    }
+}
+
 // The sign of the volume that a ray from the origin spans with the edge from a to b (its Plücker product). The same edge
 // seen from the triangle on its other side gives exactly the negative value, however the arithmetic is contracted: a ray
 // cannot pass between two triangles that share an edge.
@@ -65,6 +102,10 @@ fn intersect_triangle(index: u32, instance: u32, origin: vec3f, direction: vec3f
     let triangle = load_triangle(index);
     let e1 = triangle.p1 - triangle.p0;
     let e2 = triangle.p2 - triangle.p0;
+    if scene_has_shapes && shape_of(triangle.flags) != SHAPE_TRIANGLE {
+        intersect_shape(index, instance, triangle, origin, direction, hit);
+        return;
+    }
     let p0 = triangle.p0 - origin;
     let p1 = triangle.p1 - origin;
     let p2 = triangle.p2 - origin;

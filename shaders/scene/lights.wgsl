@@ -1,6 +1,6 @@
 // The light table: choosing a light and a point on it, and what such a sample sends to a surface.
 //
-// A sample lives in its light's own measure: area for an emissive triangle, solid angle for the environment, and a
+// A sample lives in its light's own measure: area for an emissive triangle, solid angle for environment and sun, and a
 // point mass for point, spot and directional lights. `LightContribution.value` is the integrand's light part in that
 // measure, so that value / pdf is an estimate whatever the kind.
 #include "scene/surface.wgsl"
@@ -13,6 +13,7 @@ const LIGHT_POINT = 1u;
 const LIGHT_SPOT = 2u;
 const LIGHT_DIRECTIONAL = 3u;
 const LIGHT_ENVIRONMENT = 4u;
+const LIGHT_SUN = 5u;
 
 struct LightContribution {
     direction: vec3f, // unit, from the surface to the light
@@ -21,59 +22,129 @@ struct LightContribution {
     solid_angle_jacobian: f32, // converts a density in the sample's measure to solid angle; 0 for a point mass
 }
 
-// The point of a light sample on its triangle, in barycentrics.
+// The point of a light sample on its triangle, in barycentrics; on another shape, as `triangle_point` takes it.
 fn light_sample_barycentrics(sample: LightSample) -> vec2f {
-    return sample_triangle(unpack_point(sample.point));
+    let u = unpack_point(sample.point);
+    if scene_has_shapes {
+        return shape_sample(shape_of(load_triangle(lights[sample.light].triangle).flags), u);
+    }
+    return sample_triangle(u);
 }
 
-fn environment_sample_direction(sample: LightSample) -> vec3f {
-    return environment_direction(unpack_point(sample.point));
-}
-
-// Draws a light by its probability and a point on it.
-fn light_sample(rng: ptr<function, Rng>) -> LightSample {
+// Draws a light by its probability and a point on it, for a surface at `position`: on a sphere a point of the cap that is
+// seen from there.
+fn light_sample(position: vec3f, rng: ptr<function, Rng>) -> LightSample {
     let bits = random_bits(rng);
     var light = bits_below(bits.x, frame.light_count);
     if bits_to_unit(bits.y) >= lights[light].alias_threshold {
         light = lights[light].alias_light;
     }
     if scene_has_environment && light == frame.environment_light {
-        return LightSample(light, environment_sample(bits.zw, random_4(rng).xyz));
+        return LightSample(light, environment_sample(bits.zw, rng));
+    }
+    if scene_has_shapes && lights[light].kind == LIGHT_TRIANGLE && is_sphere(load_triangle(lights[light].triangle).flags) {
+        let u = vec2f(bits_to_unit(bits.z), bits_to_unit(bits.w));
+        return LightSample(light, sample_sphere_light(light, position, u));
     }
     return LightSample(light, pack_cell(bits.zw >> vec2u(16u)));
 }
 
+struct Sphere {
+    center: vec3f,
+    radius: f32,
+}
+
+fn world_sphere(instance: u32, triangle: u32) -> Sphere {
+    let corners = triangle_corners(instance, triangle);
+    return Sphere(corners.p0, length(corners.p1 - corners.p0));
+}
+
+// A point of a spherical light that is seen from a position; any point from within, where none is.
+fn sample_sphere_light(light: u32, position: vec3f, u: vec2f) -> u32 {
+    let instance = lights[light].instance;
+    let sphere = world_sphere(instance, lights[light].triangle);
+    let to_center = sphere.center - position;
+    if dot(to_center, to_center) <= square(sphere.radius) {
+        return 0u;
+    }
+    var normal = sample_visible_sphere(to_center, sphere.radius, u);
+    if scene_has_instances {
+        normal = normalize(instance_vector(instance, TO_OBJECT, normal));
+    }
+    return pack_point(sphere_uv(normal));
+}
+
+// Density per solid angle of directions to the sphere from a position; 0 from within.
+fn sphere_solid_angle_pdf(instance: u32, triangle: u32, position: vec3f) -> f32 {
+    let sphere = world_sphere(instance, triangle);
+    let to_center = sphere.center - position;
+    let distance_2 = dot(to_center, to_center);
+    if distance_2 <= square(sphere.radius) {
+        return 0.0;
+    }
+    return 1.0 / (2.0 * PI * sphere_cone_height(distance_2, sphere.radius));
+}
+
 fn triangle_area(instance: u32, triangle: u32) -> f32 {
-    return 0.5 * length(triangle_normal(instance, triangle));
+    let scaled = length(triangle_normal(instance, triangle));
+    if scene_has_shapes {
+        return scaled * shape_area_factor(shape_of(load_triangle(triangle).flags));
+    }
+    return 0.5 * scaled;
 }
 
 // Density of `light_sample` in the sample's own measure.
-fn light_sample_pdf(sample: LightSample) -> f32 {
+fn light_sample_pdf(position: vec3f, sample: LightSample) -> f32 {
     let pmf = lights[sample.light].pmf;
     let kind = lights[sample.light].kind;
     if kind == LIGHT_TRIANGLE {
-        let area = triangle_area(lights[sample.light].instance, lights[sample.light].triangle);
+        let instance = lights[sample.light].instance;
+        let triangle = lights[sample.light].triangle;
+        if is_sphere(load_triangle(triangle).flags) {
+            // Solid angle to area.
+            let uv = light_sample_barycentrics(sample);
+            let to_light = triangle_point(instance, triangle, uv) - position;
+            let distance_2 = dot(to_light, to_light);
+            let cosine = dot(front_normal(instance, triangle, uv), -to_light) / sqrt(max(distance_2, 1e-30));
+            let pdf = sphere_solid_angle_pdf(instance, triangle, position) * cosine / max(distance_2, 1e-30);
+            return select(0.0, pmf * pdf, cosine > 0.0);
+        }
+        let area = triangle_area(instance, triangle);
         // Also 0 where the area is 0 in f32, or the density too large for it.
         return select(0.0, pmf / area, area > 1e-30);
     }
     if scene_has_environment && kind == LIGHT_ENVIRONMENT {
         return pmf * environment_point_pdf(sample.point);
     }
+    if scene_has_sun && kind == LIGHT_SUN {
+        return pmf * sun_pdf();
+    }
     return pmf;
 }
 
-// Density per solid angle with which `light_sample` would have drawn the hit that a BRDF ray made on light `light`.
-fn light_hit_pdf(light: u32, instance: u32, triangle: u32, direction: vec3f, distance: f32) -> f32 {
-    let scaled_normal = triangle_normal(instance, triangle);
-    let cosine_times_twice_area = abs(dot(scaled_normal, direction));
-    if cosine_times_twice_area <= 0.0 {
+// Density per solid angle with which `light_sample` would have drawn the hit that a BRDF ray from `position` made on
+// light `light`.
+fn light_hit_pdf(light: u32, instance: u32, triangle: u32, position: vec3f, direction: vec3f, distance: f32) -> f32 {
+    let flags = load_triangle(triangle).flags;
+    if is_sphere(flags) {
+        return lights[light].pmf * sphere_solid_angle_pdf(instance, triangle, position);
+    }
+    var cosine_times_area = abs(dot(triangle_normal(instance, triangle), direction)) * 0.5;
+    if scene_has_shapes {
+        cosine_times_area *= 2.0 * shape_area_factor(shape_of(flags));
+    }
+    if cosine_times_area <= 0.0 {
         return 0.0;
     }
-    return lights[light].pmf * 2.0 * distance * distance / cosine_times_twice_area;
+    return lights[light].pmf * distance * distance / cosine_times_area;
 }
 
 fn environment_hit_pdf(direction: vec3f) -> f32 {
     return lights[frame.environment_light].pmf * environment_pdf(direction);
+}
+
+fn sun_hit_pdf() -> f32 {
+    return lights[frame.sun_light].pmf * sun_pdf();
 }
 
 // KHR_lights_punctual: inverse square, windowed by the range where one is given.
@@ -114,8 +185,7 @@ fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> L
         let distance_2 = dot(to_light, to_light);
         let distance = sqrt(distance_2);
         let direction = to_light / max(distance, 1e-20);
-        let scaled_normal = triangle_normal(instance, triangle);
-        var cosine = dot(scaled_normal, -direction) / length(scaled_normal);
+        var cosine = dot(front_normal(instance, triangle, uv), -direction);
         if (load_triangle(triangle).flags & TRIANGLE_DOUBLE_SIDED) != 0u {
             cosine = abs(cosine);
         }
@@ -124,12 +194,17 @@ fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> L
             return LightContribution(direction, distance, vec3f(0.0), 0.0);
         }
         let free = max(distance - shadow_margin(instance, triangle, position) / cosine, 0.0);
-        return LightContribution(direction, free, emitted_radiance(triangle, uv) * (cosine / distance_2),
+        return LightContribution(direction, free, emitted_radiance(triangle, uv, cosine) * (cosine / distance_2),
             distance_2 / cosine);
     }
     if scene_has_environment && kind == LIGHT_ENVIRONMENT {
-        let direction = environment_sample_direction(sample);
-        return LightContribution(direction, ENVIRONMENT_DISTANCE, environment_evaluate(direction), 1.0);
+        let uv = unpack_point(sample.point);
+        let direction = turn_to_world(environment_direction(uv), environment_turn(previous));
+        return LightContribution(direction, ENVIRONMENT_DISTANCE, environment_read(uv), 1.0);
+    }
+    if scene_has_sun && kind == LIGHT_SUN {
+        let direction = sun_sample_direction(unpack_point(sample.point), environment_turn(previous));
+        return LightContribution(direction, ENVIRONMENT_DISTANCE, lights[light].intensity, 1.0);
     }
     if !scene_has_punctual_lights {
         return LightContribution(vec3f(0.0, 1.0, 0.0), 0.0, vec3f(0.0), 0.0);

@@ -15,6 +15,7 @@ const CAMERA = 6u;
 const SHADING_NORMAL = 8u;
 const SHADOW_RAY = 9u;
 const FOOTPRINT = 20u;
+const PYRAMID_SAMPLE = 10u;
 
 fn evaluate(operation: u32, input: TestInput) -> TestOutput {
     let a = float(input.a);
@@ -26,8 +27,8 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
         }
         case LIGHT_SAMPLE: {
             var rng = rng_new(input.a.xy, 0u, input.a.z, 0u);
-            let sample = light_sample(&rng);
-            return TestOutput(vec4u(sample.light, sample.point, bitcast<u32>(light_sample_pdf(sample)),
+            let sample = light_sample(b.xyz, &rng);
+            return TestOutput(vec4u(sample.light, sample.point, bitcast<u32>(light_sample_pdf(b.xyz, sample)),
                 bitcast<u32>(lights[sample.light].pmf)), vec4u(0u));
         }
         case LIGHT_CONTRIBUTION: {
@@ -41,17 +42,22 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
             let triangle = lights[sample.light].triangle;
             let instance = lights[sample.light].instance;
             let distance = length(triangle_point(instance, triangle, light_sample_barycentrics(sample)) - a.xyz);
-            return TestOutput(bits(vec4f(light_sample_pdf(sample) * light.solid_angle_jacobian,
-                light_hit_pdf(sample.light, instance, triangle, light.direction, distance), 0.0, 0.0)), vec4u(0u));
+            return TestOutput(bits(vec4f(light_sample_pdf(a.xyz, sample) * light.solid_angle_jacobian,
+                light_hit_pdf(sample.light, instance, triangle, a.xyz, light.direction, distance), 0.0, 0.0)), vec4u(0u));
         }
         case ENVIRONMENT: {
             return TestOutput(bits_3(environment_evaluate(a.xyz), environment_pdf(a.xyz)),
                 bits(vec4f(environment_uv(a.xyz), 0.0, 0.0)));
         }
         case ENVIRONMENT_SAMPLE: {
-            let point = environment_sample(input.b.xy, a.xyz);
+            let point = environment_cell(environment_texel_by_alias(input.b.xy, a.x), a.yz);
             return TestOutput(bits_3(environment_direction(unpack_point(point)), environment_point_pdf(point)),
                 vec4u(point, 0u, 0u, 0u));
+        }
+        case PYRAMID_SAMPLE: {
+            var rng = rng_new(input.a.xy, 0u, input.a.z, 0u);
+            let texel = environment_texel_by_pyramid(&rng);
+            return TestOutput(vec4u(texel, bitcast<u32>(environment_texel_pdf(texel)), 0u), vec4u(0u));
         }
         // Out along the ray of a film point, and back to the film.
         case CAMERA: {

@@ -139,7 +139,7 @@ fn header_end(file: &[u8]) -> Option<usize> {
 }
 
 /// A file may claim at most this many bytes of pixels a byte of its own: twice what deflate can do at best.
-const MAX_EXPANSION: u64 = 2064;
+pub(crate) const MAX_EXPANSION: u64 = 2064;
 
 /// The compressions that are read. The exr crate's decoders of B44 and DWA overflow or allocate without bound on
 /// hostile files, which no check of the header can prevent.

@@ -73,8 +73,8 @@ pub fn cost(nodes: &[BvhNode]) -> f32 {
 }
 
 fn bounds_of(triangle: &Triangle) -> Aabb {
-    let Triangle { p0, p1, p2, .. } = *triangle;
-    Aabb::new(p0.min(p1).min(p2).into(), p0.max(p1).max(p2).into())
+    let [min, max] = triangle.bounds();
+    Aabb::new(min.into(), max.into())
 }
 
 /// Clusters and optimises. obvhs's own one-call builders ask for the time, which panics on wasm; this is what they do.

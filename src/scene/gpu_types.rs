@@ -2,7 +2,8 @@
 //!
 //! `gpu_struct!` registers a struct's size and field offsets in its `LAYOUT`; [`crate::gpu_layouts`] lists them all.
 
-use glam::{Mat4, Vec3, Vec4};
+use super::Shape;
+use glam::{Mat4, Vec2, Vec3, Vec4, Vec4Swizzles};
 
 /// Size and field offsets of one Rust struct with a WGSL twin.
 #[derive(Debug, Clone, Copy)]
@@ -51,6 +52,44 @@ pub struct BvhNode {
 }
 }
 
+/// [`Triangle::flags`]: two bits from here on are the [`Shape`].
+pub const SHAPE_SHIFT: u32 = 28;
+
+impl Triangle {
+    /// What the three points are.
+    pub fn shape(&self) -> Shape {
+        [Shape::Triangles, Shape::Rectangle, Shape::Disk, Shape::Sphere][(self.flags >> SHAPE_SHIFT & 3) as usize]
+    }
+
+    /// Low and high corner of the box round it.
+    pub(crate) fn bounds(&self) -> [Vec3; 2] {
+        let Triangle { p0, p1, p2, .. } = *self;
+        let (e1, e2) = (p1 - p0, p2 - p0);
+        // What arithmetic rounds must not stick out.
+        let extended = |half: Vec3| {
+            let half = half + 1e-6 * (half + p0.abs());
+            [p0 - half, p0 + half]
+        };
+        match self.shape() {
+            Shape::Triangles => [p0.min(p1).min(p2), p0.max(p1).max(p2)],
+            Shape::Rectangle => {
+                let p3 = p1 + e2;
+                [p0.min(p1).min(p2).min(p3), p0.max(p1).max(p2).max(p3)]
+            }
+            Shape::Disk => extended((e1 * e1 + e2 * e2).map(f32::sqrt)),
+            Shape::Sphere => extended(Vec3::splat(e1.length())),
+        }
+    }
+}
+
+impl TriangleAttributes {
+    /// Texture coordinates of the corners in a UV set, 0 or 1.
+    pub(crate) fn uvs(&self, set: usize) -> [Vec2; 3] {
+        let TriangleAttributes { uv_a, uv_b, uv_c, .. } = self;
+        if set == 0 { [uv_a.xy(), uv_a.zw(), uv_b.xy()] } else { [uv_b.zw(), uv_c.xy(), uv_c.zw()] }
+    }
+}
+
 /// [`Triangle::flags`]: the back is a surface too.
 pub const TRIANGLE_DOUBLE_SIDED: u32 = 1;
 /// [`Triangle::flags`]: alpha has to be tested.
@@ -64,7 +103,7 @@ gpu_struct! {
 pub struct Triangle {
     /// First corner.
     pub p0: Vec3,
-    /// `TRIANGLE_*` bits.
+    /// `TRIANGLE_*` bits, and the shape from bit [`SHAPE_SHIFT`] on.
     pub flags: u32,
     /// Second corner.
     pub p1: Vec3,
@@ -232,6 +271,106 @@ pub struct Material {
 }
 }
 
+/// [`MaterialExtensions::flags`]: KHR_materials_unlit.
+pub const MATERIAL_UNLIT: u32 = 1;
+/// [`MaterialExtensions::flags`]: the surface bounds a medium (KHR_materials_volume).
+pub const MATERIAL_VOLUME: u32 = 2;
+
+gpu_struct! {
+/// What glTF's extensions add to a [`Material`]: 464 bytes, 29 texels of the data texture `material_extensions`. A scene
+/// that uses none has none.
+pub struct MaterialExtensions {
+    /// Multiplies the dielectric's reflectance at normal incidence.
+    pub specular_color: Vec3,
+    /// Strength of the dielectric's reflection.
+    pub specular: f32,
+    /// Absorption coefficient of the medium below, 1/m.
+    pub absorption: Vec3,
+    /// Share of light that passes through.
+    pub transmission: f32,
+    /// Sheen colour.
+    pub sheen_color: Vec3,
+    /// Sheen roughness.
+    pub sheen_roughness: f32,
+    /// Index of refraction; 0 for a perfect reflector.
+    pub ior: f32,
+    /// 20 over the Abbe number.
+    pub dispersion: f32,
+    /// Strength of the clearcoat.
+    pub clearcoat: f32,
+    /// Roughness of the clearcoat.
+    pub clearcoat_roughness: f32,
+    /// Cosine and sine of the anisotropy's rotation from the tangent.
+    pub anisotropy_direction: Vec2,
+    /// Strength of the anisotropy.
+    pub anisotropy: f32,
+    /// Normal-map scale of the clearcoat.
+    pub clearcoat_normal_scale: f32,
+    /// Strength of the thin film.
+    pub iridescence: f32,
+    /// Index of refraction of the film.
+    pub film_ior: f32,
+    /// Nanometres where the thickness texture is 0.
+    pub film_thickness_minimum: f32,
+    /// Nanometres where it is 1.
+    pub film_thickness_maximum: f32,
+    /// `MATERIAL_*` bits.
+    pub flags: u32,
+    /// Unused.
+    pub padding_0: u32,
+    /// Unused.
+    pub padding_1: u32,
+    /// Unused.
+    pub padding_2: u32,
+    /// Alpha: specular strength.
+    pub specular_texture: TextureSlot,
+    /// Specular colour, sRGB.
+    pub specular_color_texture: TextureSlot,
+    /// Red: transmission.
+    pub transmission_texture: TextureSlot,
+    /// Red: clearcoat.
+    pub clearcoat_texture: TextureSlot,
+    /// Green: clearcoat roughness.
+    pub clearcoat_roughness_texture: TextureSlot,
+    /// Tangent-space normals of the clearcoat.
+    pub clearcoat_normal_texture: TextureSlot,
+    /// Sheen colour, sRGB.
+    pub sheen_color_texture: TextureSlot,
+    /// Alpha: sheen roughness.
+    pub sheen_roughness_texture: TextureSlot,
+    /// Red and green a direction, blue the strength of the anisotropy.
+    pub anisotropy_texture: TextureSlot,
+    /// Red: strength of the film.
+    pub iridescence_texture: TextureSlot,
+    /// Green: thickness of the film.
+    pub iridescence_thickness_texture: TextureSlot,
+}
+}
+
+impl MaterialExtensions {
+    /// Every texture slot, used or not.
+    pub fn slots(&self) -> [&TextureSlot; 11] {
+        [
+            &self.specular_texture,
+            &self.specular_color_texture,
+            &self.transmission_texture,
+            &self.clearcoat_texture,
+            &self.clearcoat_roughness_texture,
+            &self.clearcoat_normal_texture,
+            &self.sheen_color_texture,
+            &self.sheen_roughness_texture,
+            &self.anisotropy_texture,
+            &self.iridescence_texture,
+            &self.iridescence_thickness_texture,
+        ]
+    }
+
+    /// Every factor, for checks; the flags among them read as a number next to zero.
+    pub fn factors(&self) -> &[f32] {
+        bytemuck::cast_slice(&bytemuck::bytes_of(self)[..std::mem::offset_of!(MaterialExtensions, specular_texture)])
+    }
+}
+
 /// [`Light::kind`]: an emissive triangle.
 pub const LIGHT_TRIANGLE: u32 = 0;
 /// [`Light::kind`]: a point light.
@@ -242,6 +381,8 @@ pub const LIGHT_SPOT: u32 = 2;
 pub const LIGHT_DIRECTIONAL: u32 = 3;
 /// [`Light::kind`]: the environment.
 pub const LIGHT_ENVIRONMENT: u32 = 4;
+/// [`Light::kind`]: the sun.
+pub const LIGHT_SUN: u32 = 5;
 
 gpu_struct! {
 /// One light with its entry in the alias table: 112 bytes.
@@ -254,13 +395,13 @@ pub struct Light {
     pub previous_position: Vec3,
     /// Index of the triangle of an emissive triangle.
     pub triangle: u32,
-    /// Unit direction in which a spot or directional light shines.
+    /// Unit direction in which a spot, a directional light or the sun shines.
     pub direction: Vec3,
     /// Range in metres; 0 for unlimited.
     pub range: f32,
-    /// Candela (point, spot) or lux (directional), linear Rec. 709.
+    /// Candela (point, spot), lux (directional) or radiance (sun), linear Rec. 709.
     pub intensity: Vec3,
-    /// cos of the spot's outer angle.
+    /// cos of the spot's outer angle; 1 - cos of the sun's angular radius.
     pub cos_outer: f32,
     /// cos of the spot's inner angle.
     pub cos_inner: f32,

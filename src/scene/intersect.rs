@@ -1,7 +1,7 @@
 //! Ray queries on the CPU: the same arithmetic as `shaders/scene/bvh.wgsl`, which tests compare with it.
 
-use super::FlatScene;
 use super::gpu_types::{BvhNode, TRIANGLE_DOUBLE_SIDED, Triangle};
+use super::{FlatScene, Shape, octahedral};
 use glam::Vec3;
 
 /// Where a ray met a triangle.
@@ -76,6 +76,9 @@ fn edge_product(a: Vec3, b: Vec3, direction: Vec3) -> f32 {
 /// Edge tests by Plücker products (Davidovic et al. 2012), rounding let pass: (t, u, v) if 0 < t < `t_max`.
 pub fn intersect_triangle(triangle: &Triangle, origin: Vec3, direction: Vec3, t_max: f32) -> Option<(f32, f32, f32)> {
     let (e1, e2) = (triangle.p1 - triangle.p0, triangle.p2 - triangle.p0);
+    if triangle.shape() != Shape::Triangles {
+        return intersect_shape(triangle, origin, direction, t_max);
+    }
     let [p0, p1, p2] = [triangle.p0, triangle.p1, triangle.p2].map(|p| p - origin);
     let [w0, w1, w2] = [(p2, p1), (p0, p2), (p1, p0)].map(|(a, b)| edge_product(a, b, direction));
     let sum = w0 + w1 + w2;
@@ -92,6 +95,39 @@ pub fn intersect_triangle(triangle: &Triangle, origin: Vec3, direction: Vec3, t_
     // `min` and `max` rather than `clamp`, which does not bear a NaN.
     let u = (w1 / sum).max(0.0).min(1.0);
     hits.then_some((t, u, (w2 / sum).max(0.0).min(1.0 - u)))
+}
+
+/// A primitive that is no triangle: (t, u, v) as `intersect_shape` of `shaders/scene/bvh.wgsl`.
+fn intersect_shape(triangle: &Triangle, origin: Vec3, direction: Vec3, t_max: f32) -> Option<(f32, f32, f32)> {
+    let (e1, e2) = (triangle.p1 - triangle.p0, triangle.p2 - triangle.p0);
+    let s = origin - triangle.p0;
+    if triangle.shape() == Shape::Sphere {
+        let t = enter_sphere(s, direction, e1.length()).filter(|t| *t > 0.0 && *t < t_max)?;
+        let p = 0.5 * octahedral::encode((s + t * direction).normalize()) + 0.5;
+        return Some((t, p.x, p.y));
+    }
+    let p = direction.cross(e2);
+    let determinant = e1.dot(p);
+    let culled = determinant < 0.0 && triangle.flags & TRIANGLE_DOUBLE_SIDED == 0;
+    if determinant == 0.0 || culled {
+        return None;
+    }
+    let q = s.cross(e1);
+    let (u, v, t) = (s.dot(p) / determinant, direction.dot(q) / determinant, e2.dot(q) / determinant);
+    let is_within = match triangle.shape() {
+        Shape::Disk => u * u + v * v <= 1.0,
+        _ => u >= 0.0 && v >= 0.0 && u <= 1.0 && v <= 1.0,
+    };
+    (is_within && t > 0.0 && t < t_max).then_some((t, u, v))
+}
+
+/// Where a ray enters a sphere from outside; see `shaders/lib/shapes.wgsl`.
+fn enter_sphere(origin: Vec3, direction: Vec3, radius: f32) -> Option<f32> {
+    let (a, b) = (direction.length_squared(), -origin.dot(direction));
+    let nearest = origin + direction * (b / a);
+    let discriminant = radius * radius - nearest.length_squared();
+    let c = origin.length_squared() - radius * radius;
+    (b > 0.0 && c > 0.0 && discriminant >= 0.0).then(|| c / (b + (a * discriminant).sqrt()))
 }
 
 /// Whether the ray meets the node's box within [0, t_max], two ulps wider so that rounding loses none (Ize 2013).

@@ -2,7 +2,9 @@
 
 use super::flat::face_normal;
 use super::random::Random;
+use super::sky::Sky;
 use super::{Environment, PunctualKind, PunctualLight, Scene};
+use crate::error::Result;
 use glam::Vec3;
 
 /// More scattered lights than this are not made.
@@ -12,16 +14,37 @@ const MIN_EXTENT: f32 = 1e-6;
 const SEED: u64 = 0x6c69_6768;
 
 impl Scene {
+    /// Puts what `name` calls round the scene, in place of its environment and sun: `sky`, `sky:elevation=10,turbidity=4`
+    /// (see [`Sky::parse`]), or `white`, radiance 1 from everywhere. Whether the name is one of these; others are left to
+    /// the caller, as names of files.
+    ///
+    /// # Errors
+    /// As [`Sky::parse`].
+    pub fn surround(&mut self, name: &str) -> Result<bool> {
+        match name.split_once(':').unwrap_or((name, "")) {
+            ("sky", parameters) => Sky::parse(parameters)?.surround(self),
+            ("white", "") => self.surround_by(Environment::even(Vec3::ONE)),
+            _ => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    /// Puts a map round the scene, in place of its environment and sun.
+    pub fn surround_by(&mut self, environment: Environment) {
+        self.environment = Some(environment);
+        self.sun = None;
+    }
+
     /// If nothing in the scene shines, adds `scatter` white point lights, uniformly in the box of the scene (as thesis
-    /// `001`, section 5.1), or an even white sky if `scatter` is 0, and says so in the warnings. Together the point lights
+    /// `001`, section 5.1), or sun and sky if `scatter` is 0, and says so in the warnings. Together the point lights
     /// give the same light whatever their number, in proportion to the square of the scene's size.
     pub fn ensure_light(&mut self, scatter: u32, seed: u64) {
         if self.has_light() {
             return;
         }
         if scatter == 0 {
-            self.environment = Some(Environment::even(Vec3::ONE));
-            self.warnings.push("the scene has no light: an even white sky was added".into());
+            Sky::default().surround(self);
+            self.warnings.push("the scene has no light: sun and sky were added".into());
             return;
         }
         let scatter = scatter.min(MAX_SCATTERED);
@@ -58,6 +81,7 @@ impl Scene {
         let bright = |environment: &Environment| environment.pixels.iter().flatten().any(|&c| c > 0.0);
         self.lights.iter().any(|light| light.intensity != Vec3::ZERO)
             || self.environment.as_ref().is_some_and(bright)
+            || self.sun.is_some_and(|sun| sun.irradiance != Vec3::ZERO)
             || self.instances.iter().any(emits)
     }
 
@@ -139,10 +163,22 @@ mod tests {
     }
 
     #[test]
+    fn surroundings_by_name() {
+        let mut scene = Scene::default();
+        assert!(scene.surround("sky:elevation=70").unwrap());
+        let high = scene.sun.unwrap();
+        assert!((high.direction.y - 70f32.to_radians().sin()).abs() < 1e-5);
+        assert!(scene.surround("white").unwrap());
+        assert!(scene.sun.is_none() && scene.environment.as_ref().is_some_and(|e| e.pixels == [[1.0; 3]]));
+        assert!(!scene.surround("sky.exr").unwrap() && !scene.surround("white:1").unwrap());
+        assert!(scene.surround("sky:elevation=100").is_err());
+    }
+
+    #[test]
     fn no_lights_asked_for_means_a_sky() {
         for mut scene in [dark(), Scene::default()] {
             scene.ensure_light(0, 0);
-            assert!(scene.environment.is_some() && scene.warnings.len() == 1);
+            assert!(scene.environment.is_some() && scene.sun.is_some() && scene.warnings.len() == 1);
         }
         let mut empty = Scene::default();
         empty.ensure_light(3, 0);

@@ -4,6 +4,7 @@
 //! thing as plain arrays with a BVH, ready for upload.
 
 pub mod alias;
+pub mod area_light;
 pub mod builtin;
 pub mod bvh;
 pub mod environment;
@@ -14,12 +15,17 @@ pub mod gltf;
 pub mod gpu_types;
 pub mod intersect;
 mod lights;
+mod material;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod obj;
 pub mod octahedral;
 pub mod random;
 pub mod shapes;
+pub mod sky;
 pub mod tangents;
 
 pub use flat::FlatScene;
+pub use material::{Anisotropy, Clearcoat, Iridescence, Sheen, Specular, Transmission, Volume};
 
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
@@ -46,6 +52,8 @@ pub struct Scene {
     pub lights: Vec<PunctualLight>,
     /// Light from infinitely far away, if any.
     pub environment: Option<Environment>,
+    /// The sun, if any: seen in front of the environment, and turned with it.
+    pub sun: Option<Sun>,
     /// Cameras of the file, in file order; may be empty.
     pub cameras: Vec<Camera>,
     /// How lights move; empty for a static scene.
@@ -54,9 +62,25 @@ pub struct Scene {
     pub warnings: Vec<String>,
 }
 
+/// What three indices of a [`Mesh`] stand for. With the edges e1 and e2 from the first point to the others:
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Shape {
+    /// A triangle.
+    #[default]
+    Triangles,
+    /// The parallelogram of the edges.
+    Rectangle,
+    /// The ellipse round the first point with the edges for half axes.
+    Disk,
+    /// The sphere round the first point through the second. It is seen from outside only.
+    Sphere,
+}
+
 /// One indexed triangle list with one material.
 #[derive(Debug, Clone, Default)]
 pub struct Mesh {
+    /// What the indices stand for. Only triangles take textures and alpha masks as one expects.
+    pub shape: Shape,
     /// Object-space positions.
     pub positions: Vec<Vec3>,
     /// Object-space unit normals, one a position.
@@ -91,7 +115,7 @@ pub enum AlphaMode {
     Mask(f32),
 }
 
-/// glTF 2.0 metallic-roughness material.
+/// glTF 2.0 metallic-roughness material with its extensions (`docs/materials.md`).
 #[derive(Debug, Clone)]
 pub struct Material {
     /// For reports.
@@ -118,6 +142,67 @@ pub struct Material {
     pub normal_texture: Option<TextureRef>,
     /// sRGB emission.
     pub emissive_texture: Option<TextureRef>,
+    /// KHR_materials_unlit: the base colour is shown as it is and nothing is reflected.
+    pub unlit: bool,
+    /// KHR_materials_ior: index of refraction of the dielectric, at least 1; or 0, which reflects everything at any angle.
+    pub ior: f32,
+    /// KHR_materials_dispersion: 20 over the Abbe number; 0 for none.
+    pub dispersion: f32,
+    /// KHR_materials_specular.
+    pub specular: Specular,
+    /// KHR_materials_transmission.
+    pub transmission: Transmission,
+    /// KHR_materials_volume; without it a transmissive surface is a thin wall.
+    pub volume: Option<Volume>,
+    /// KHR_materials_clearcoat.
+    pub clearcoat: Clearcoat,
+    /// KHR_materials_sheen.
+    pub sheen: Sheen,
+    /// KHR_materials_anisotropy.
+    pub anisotropy: Anisotropy,
+    /// KHR_materials_iridescence.
+    pub iridescence: Iridescence,
+}
+
+impl Material {
+    /// Whether rays pass through the surface into a medium below it. Such a surface has two sides, whatever
+    /// `double_sided` says.
+    pub fn bounds_a_medium(&self) -> bool {
+        self.volume.is_some() && self.transmission.factor > 0.0
+    }
+
+    /// Whether the back is a surface too.
+    pub fn is_two_sided(&self) -> bool {
+        self.double_sided || self.bounds_a_medium()
+    }
+
+    /// Every texture it reads.
+    pub fn textures(&self) -> impl Iterator<Item = TextureRef> {
+        [
+            self.base_color_texture,
+            self.metallic_roughness_texture,
+            self.normal_texture,
+            self.emissive_texture,
+            self.specular.texture,
+            self.specular.color_texture,
+            self.transmission.texture,
+            self.clearcoat.texture,
+            self.clearcoat.roughness_texture,
+            self.clearcoat.normal_texture,
+            self.sheen.color_texture,
+            self.sheen.roughness_texture,
+            self.anisotropy.texture,
+            self.iridescence.texture,
+            self.iridescence.thickness_texture,
+        ]
+        .into_iter()
+        .flatten()
+    }
+
+    /// The texture that a mesh's tangents are for: the first that lives in tangent space.
+    pub fn tangent_texture(&self) -> Option<TextureRef> {
+        self.normal_texture.or(self.clearcoat.normal_texture).or(self.anisotropy.texture)
+    }
 }
 
 impl Default for Material {
@@ -135,6 +220,16 @@ impl Default for Material {
             metallic_roughness_texture: None,
             normal_texture: None,
             emissive_texture: None,
+            unlit: false,
+            ior: 1.5,
+            dispersion: 0.0,
+            specular: Specular::default(),
+            transmission: Transmission::default(),
+            volume: None,
+            clearcoat: Clearcoat::default(),
+            sheen: Sheen::default(),
+            anisotropy: Anisotropy::default(),
+            iridescence: Iridescence::default(),
         }
     }
 }
@@ -228,6 +323,30 @@ impl Environment {
     /// The same radiance from everywhere.
     pub fn even(radiance: Vec3) -> Self {
         Environment { width: 1, height: 1, pixels: vec![radiance.to_array()] }
+    }
+}
+
+/// A disk of even radiance, infinitely far away.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sun {
+    /// Unit direction towards its centre.
+    pub direction: Vec3,
+    /// Irradiance of a surface that faces it, linear Rec. 709.
+    pub irradiance: Vec3,
+    /// Half the angle under which it is seen, in radians, at most a right angle.
+    pub angular_radius: f32,
+}
+
+impl Sun {
+    /// 1 - cos(angular radius).
+    pub(crate) fn height(&self) -> f64 {
+        2.0 * (0.5 * f64::from(self.angular_radius)).sin().powi(2)
+    }
+
+    /// Its radiance: irradiance over projected solid angle, pi sin^2 of the angular radius.
+    pub fn radiance(&self) -> Vec3 {
+        let sin = f64::from(self.angular_radius).sin();
+        (self.irradiance.as_dvec3() / (std::f64::consts::PI * sin * sin)).as_vec3()
     }
 }
 

@@ -168,6 +168,74 @@ test('a dropped .gltf is shown', () =>
     assert.notDeepEqual(await readDisplay(page), before);
   }));
 
+/** A Radiance file of one row of texels, each of this RGBE. */
+const radiance = (...texels) => [...Buffer.from(`#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X ${texels.length}\n`), ...texels.flat()];
+
+/** Drops a file of bytes. */
+const dropBytes = (page, name, bytes) =>
+  page.evaluate(
+    (fileName, content) => {
+      const dataTransfer = new DataTransfer();
+      dataTransfer.items.add(new File([Uint8Array.from(content)], fileName));
+      document.body.dispatchEvent(new DragEvent('drop', { dataTransfer, bubbles: true, cancelable: true }));
+    },
+    name,
+    bytes,
+  );
+
+const chosenEnvironment = (page, text) =>
+  page.waitForFunction((wanted) => document.getElementById('environment').value === wanted, { polling: 50 }, text);
+
+test('sun and sky by the address are those of the command line', () =>
+  withPage('?scene=glossy-spheres&environment=sky:elevation=20,azimuth=160&technique=path-tracer&size=64x48&frames=2', async (page) => {
+    await waitForFrames(page, 2);
+    const options = ['--environment', 'sky:elevation=20,azimuth=160', '--technique', 'path-tracer', '--size', '64x48', '--frames', '2'];
+    const native = await renderNatively('builtin:glossy-spheres', options);
+    assertSamePicture(await readDisplay(page), native.rgb);
+    assert.equal(new URL(page.url()).searchParams.get('environment'), 'sky:elevation=20,azimuth=160');
+  }));
+
+test('a dropped environment map lights the scene that is shown, and the menu takes it away again', () =>
+  withPage('?scene=furnace&technique=path-tracer&size=16x16&frames=1', async (page) => {
+    await waitForFrames(page, 1);
+    const before = await readDisplay(page);
+    await dropBytes(page, 'red.hdr', radiance([128, 0, 0, 128], [128, 0, 0, 128]));
+    await chosenEnvironment(page, 'red.hdr');
+    await waitForFrames(page, 1);
+    const red = await readDisplay(page);
+    assert.ok(red.every((value, at) => at % 3 === 0 || value < 40) && red.some((value) => value > 100), 'all is red');
+    assert.equal(await page.evaluate(() => document.getElementById('scene').value), 'furnace');
+
+    await dropBytes(page, 'broken.exr', [1, 2, 3]);
+    assert.match(await waitForMessage(page), /broken\.exr/);
+    await page.click('#message-close');
+    assert.deepEqual(await readDisplay(page), red);
+
+    await page.select('#environment', '');
+    await chosenEnvironment(page, '');
+    await waitForFrames(page, 1);
+    assert.deepEqual(await readDisplay(page), before);
+    await page.select('#environment', 'sky');
+    await page.waitForFunction(() => location.search.includes('environment=sky'), { polling: 50 });
+  }));
+
+test('an environment map by its address', () => {
+  const map = `data:application/octet-stream;base64,${Buffer.from(radiance([0, 128, 0, 128], [0, 128, 0, 128])).toString('base64')}`;
+  return withPage(`?scene=furnace&technique=path-tracer&size=16x16&frames=1&environment=${encodeURIComponent(map)}`, async (page) => {
+    await waitForFrames(page, 1);
+    const green = await readDisplay(page);
+    assert.ok(green.every((value, at) => at % 3 === 1 || value < 40) && green.some((value) => value > 100), 'all is green');
+  });
+});
+
+test('an environment that is not there is named, and the scene is shown without it', async () => {
+  const { page } = await openPage(site, '?scene=cornell&technique=normals&size=16x16&frames=1&environment=missing.hdr');
+  assert.match(await waitForMessage(page), /missing\.hdr: the server says 404/);
+  await page.click('#message-close');
+  await waitForFrames(page, 1);
+  await page.close();
+});
+
 test('something that is no scene is refused in words', () =>
   withPage('?scene=cornell&technique=normals&size=16x16&frames=1', async (page) => {
     await waitForFrames(page, 1);

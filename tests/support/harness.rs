@@ -2,7 +2,7 @@
 
 use restir::gpu::recorder::Recorder;
 use restir::gpu::shader::Shader;
-use restir::gpu_scene::{GpuScene, environment_light};
+use restir::gpu_scene::{GpuScene, environment_light, sun_light};
 use restir::scene::{Camera, FlatScene};
 use restir::{Gpu, frame};
 
@@ -47,10 +47,6 @@ pub mod functions {
     pub const OCTAHEDRAL: u32 = 2;
     pub const BASIS: u32 = 3;
     pub const WARPS: u32 = 4;
-    pub const BRDF: u32 = 5;
-    pub const BRDF_SAMPLE: u32 = 6;
-    pub const GGX_SAMPLE: u32 = 7;
-    pub const GGX_PDF: u32 = 8;
     pub const SRGB: u32 = 9;
     pub const TONE_MAP: u32 = 10;
     pub const MIS_WEIGHT: u32 = 11;
@@ -73,6 +69,7 @@ pub mod scene_functions {
     pub const SHADING_NORMAL: u32 = 8;
     pub const SHADOW_RAY: u32 = 9;
     pub const FOOTPRINT: u32 = 20;
+    pub const PYRAMID_SAMPLE: u32 = 10;
 }
 
 impl TestInput {
@@ -117,7 +114,12 @@ pub fn eval_gpu(
     let input = gpu.storage_of("test inputs", inputs).expect("inputs fit");
     let size = (inputs.len() * size_of::<TestOutput>()) as u64;
     let output = gpu.storage("test outputs", size).expect("outputs fit");
-    let gpu_scene = scene.map(|scene| GpuScene::new(gpu, scene).expect("the scene fits"));
+    let by_pyramid = operation == scene_functions::PYRAMID_SAMPLE;
+    let gpu_scene = scene.map(|scene| {
+        let mut gpu_scene = GpuScene::new(gpu, scene).expect("the scene fits");
+        gpu_scene.sample_by_pyramid(gpu, by_pyramid);
+        gpu_scene
+    });
     let frame_uniform = gpu.uniform("frame", size_of::<frame::Frame>() as u64);
     if let Some(scene) = scene {
         gpu.queue.write_buffer(&frame_uniform, 0, bytemuck::bytes_of(&frame_of(scene, &scene.cameras[0])));
@@ -127,6 +129,7 @@ pub fn eval_gpu(
     if let Some(gpu_scene) = &gpu_scene {
         gpu_scene.share(&mut recorder);
         recorder.share("frame", &frame_uniform);
+        gpu_scene.record(&mut recorder).expect("everything is bound");
     }
     recorder
         .pass(shader)
@@ -151,6 +154,9 @@ pub fn frame_of(scene: &FlatScene, camera: &Camera) -> frame::Frame {
         light_count: scene.lights.len() as u32,
         environment_light: environment_light(scene),
         top_level: scene.root(),
+        sun_light: sun_light(scene),
+        environment_turn: glam::Vec2::X,
+        previous_environment_turn: glam::Vec2::X,
         scene_radius: 1.0,
         ..bytemuck::Zeroable::zeroed()
     }

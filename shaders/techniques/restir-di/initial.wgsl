@@ -24,7 +24,7 @@ fn sample_pixel(pixel: vec2u) {
     var streams = array<Stream, MAXIMUM_RESERVOIR_SIZE>(
         stream_empty(), stream_empty(), stream_empty(), stream_empty());
     for (var i = 0u; i < params.light_samples; i += 1u) {
-        let sample = light_sample(&rng);
+        let sample = light_sample(surface.position, &rng);
         let weight = candidate_weight(surface, sample, params.light_samples);
         let u = random_4(&rng);
         for (var slot = 0u; slot < slots; slot += 1u) {

@@ -23,7 +23,7 @@ fn reproject(surface: Surface) -> vec2i {
 
 fn is_same_surface(surface: Surface, previous: Surface) -> bool {
     let distance = length(surface.position - frame.camera.position);
-    let albedo_difference = abs(surface.brdf.base_color - previous.brdf.base_color);
+    let albedo_difference = abs(surface.bsdf.base_color - previous.bsdf.base_color);
     return length(surface.position - previous.position) <= params.temporal_position_threshold * distance
         && dot(surface.basis.normal, previous.basis.normal) >= params.temporal_normal_threshold
         && max(albedo_difference.r, max(albedo_difference.g, albedo_difference.b)) <= params.temporal_albedo_threshold;

@@ -23,7 +23,7 @@ fn pixel_radiance(pixel: vec2u) -> vec3f {
     var rng = rng_new(pixel, frame.index, frame.seed, STREAM_INITIAL);
     var stream = stream_empty();
     for (var i = 0u; i < params.candidates; i += 1u) {
-        let sample = light_sample(&rng);
+        let sample = light_sample(surface.position, &rng);
         stream_update(&stream, sample, candidate_weight(surface, sample, params.candidates), random_1(&rng));
     }
     let weight = stream_contribution_weight(stream, target_function(surface, stream.selected, false));

@@ -8,6 +8,9 @@ use restir::scene::flat::SceneStats;
 use restir::{Gpu, GpuOptions, Renderer, techniques};
 use std::time::Instant;
 
+/// The parameter that turns the environment, which is then something that moves.
+const TURN: &str = "render.environment_rotation_rate";
+
 /// What is rendered, and how.
 #[derive(clap::Args)]
 pub struct Options {
@@ -29,6 +32,8 @@ pub struct Options {
     /// Longest path in scattering events: 1 is direct light only. Lights seen directly are always drawn.
     #[arg(long, value_name = "N", value_parser = options::max_depth)]
     pub max_depth: Option<u32>,
+    #[command(flatten)]
+    pub choice: scene::Choice,
     #[command(flatten)]
     pub lighting: scene::Lighting,
 }
@@ -71,13 +76,13 @@ impl Session {
         for (key, value) in &options.set {
             options::check_value(technique, key, value).map_err(Failure::from_option)?;
         }
-        let mut scene = scene::load(name)?;
-        scene::light(&mut scene, &options.lighting, options.seed)?;
-        let flat = scene::flatten(&scene)?;
+        let flat = scene::open(name, &options.choice, Some((&options.lighting, options.seed)))?;
         report::warnings(&flat.warnings);
         let camera = scene::camera(&flat.cameras, options.camera.as_deref())?.clone();
         let (scene, stats, warnings) = (flat.name.clone(), flat.stats.clone(), flat.warnings.clone());
-        let moving = !flat.motions.is_empty();
+        let turns =
+            options.set.iter().any(|(key, value)| key == TURN && value.parse::<f32>().is_ok_and(|rate| rate != 0.0));
+        let moving = turns || !flat.motions.is_empty();
 
         let gpu = block_on(Gpu::headless(&GpuOptions { default_limits: false }))?;
         let adapter = gpu.adapter_name();

@@ -40,12 +40,13 @@ fn flatten_one(material: &scene::Material, scene: &Scene, find: Find) -> std::re
     let mut slot = |texture, texels| slot(texture, texels, scene, find);
     Ok(Material {
         base_color: material.base_color,
-        emissive: material.emissive,
+        // An unlit surface shines, but is no light.
+        emissive: if material.unlit { Vec3::ZERO } else { material.emissive },
         metallic: material.metallic,
         roughness: material.roughness,
         normal_scale: material.normal_scale,
         alpha_cutoff: cutoff,
-        double_sided: u32::from(material.double_sided),
+        double_sided: u32::from(material.is_two_sided()),
         base_color_texture: slot(material.base_color_texture, base_color)?,
         metallic_roughness_texture: slot(material.metallic_roughness_texture, Texels::Data)?,
         normal_texture: slot(material.normal_texture, Texels::Normal)?,
@@ -53,7 +54,7 @@ fn flatten_one(material: &scene::Material, scene: &Scene, find: Find) -> std::re
     })
 }
 
-fn slot(
+pub(super) fn slot(
     reference: Option<TextureRef>,
     texels: Texels,
     scene: &Scene,
@@ -92,7 +93,7 @@ fn wrap_bits(wrap: Wrap) -> u32 {
 
 /// KHR_texture_transform: translation x rotation x scale. V points down, so that turning the coordinates
 /// counter-clockwise, as seen on the image, takes (1, 0) to (cos, -sin).
-fn uv_rows(reference: &TextureRef) -> [Vec3; 2] {
+pub(super) fn uv_rows(reference: &TextureRef) -> [Vec3; 2] {
     let (sin, cos) = reference.rotation.sin_cos();
     let TextureRef { scale, offset, .. } = reference;
     [Vec3::new(cos * scale.x, sin * scale.y, offset.x), Vec3::new(-sin * scale.x, cos * scale.y, offset.y)]

@@ -1,6 +1,10 @@
 //! A scene as plain arrays with a BVH: what is uploaded, sent from a Worker to the page, and kept to rebuild a lost device.
 
 mod bytes;
+pub mod cooked;
+mod emission;
+pub(crate) mod environment;
+mod extensions;
 mod framing;
 pub(crate) mod levels;
 mod lights;
@@ -11,9 +15,10 @@ mod textures;
 mod triangles;
 mod validate;
 
+pub use environment::FlatEnvironment;
 pub(super) use triangles::face_normal;
 
-use super::gpu_types::{BvhNode, EnvironmentTexel, Light, Material, NONE, Triangle, TriangleAttributes};
+use super::gpu_types::{BvhNode, Light, Material, MaterialExtensions, NONE, Triangle, TriangleAttributes};
 use super::{Camera, LightMotion, MAX_COORDINATE, Projection, PunctualKind, Scene, bvh};
 use crate::error::{Error, Result};
 use glam::{Mat4, Vec3};
@@ -72,19 +77,6 @@ pub struct TextureStats {
     pub used_bytes: u64,
 }
 
-/// The environment with its alias table.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FlatEnvironment {
-    /// Width in texels.
-    pub width: u32,
-    /// Height in texels.
-    pub height: u32,
-    /// Linear radiance, RGB and an unused 1.
-    pub radiance: Vec<[f32; 4]>,
-    /// One entry a texel.
-    pub alias: Vec<EnvironmentTexel>,
-}
-
 /// What a scene holds, for reports.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SceneStats {
@@ -102,7 +94,7 @@ pub struct SceneStats {
     pub textures: u64,
     /// The arrays that their images lie in.
     pub texture_arrays: Vec<TextureStats>,
-    /// Lights: emissive triangles + punctual lights + environment.
+    /// Lights: emissive triangles + punctual lights + sun + environment.
     pub lights: u64,
     /// Emissive triangles among them.
     pub emissive_triangles: u64,
@@ -166,7 +158,9 @@ pub struct FlatScene {
     pub instances: Vec<FlatInstance>,
     /// At least one.
     pub materials: Vec<Material>,
-    /// With alias table; the environment, if any, is the last. May be empty.
+    /// What glTF's extensions add to each material; empty where no material uses one.
+    pub material_extensions: Vec<MaterialExtensions>,
+    /// With alias table; the sun and the environment, if any, are the last. May be empty.
     pub lights: Vec<Light>,
     /// Index in `lights` of the first punctual light; they follow in the order of [`Scene::lights`].
     pub first_punctual: u32,
@@ -202,22 +196,24 @@ impl FlatScene {
 
         // Once to learn which images there are and what they mean, once to say where they went.
         let mut images = textures::Images::new(scene)?;
-        materials::flatten(scene, &mut |texture, texels| {
-            images.ask(texture, texels).map(|_| textures::Place::default())
-        })?;
+        let mut ask = |texture, texels| images.ask(texture, texels).map(|_| textures::Place::default());
+        materials::flatten(scene, &mut ask)?;
+        extensions::flatten(scene, &mut ask)?;
         let mut report = |fraction| progress(0.8 + 0.1 * fraction, "making mip levels");
         let (textures, places) = images.pack(&mut warnings, &mut report)?;
-        let materials = materials::flatten(scene, &mut |texture, texels| {
-            images.ask(texture, texels).and_then(|image| places.get(image).copied())
-        })?;
+        let mut find = |texture, texels| images.ask(texture, texels).and_then(|image| places.get(image).copied());
+        let materials = materials::flatten(scene, &mut find)?;
+        let material_extensions = extensions::flatten(scene, &mut find)?;
 
         progress(0.9, "weighing lights");
         let environment = match &scene.environment {
-            Some(environment) => lights::environment(environment)?,
+            Some(environment) => FlatEnvironment::build(environment)?,
             None => None,
         };
-        let emitters = lights::emitters(&mut triangles, &meshes, &mut instances, &materials);
-        let (lights, first_punctual) = lights::build(emitters, &scene.lights, environment.is_some())?;
+        let emission = emission::Emission::new(scene);
+        let emitters = lights::emitters(&mut triangles, &meshes, &mut instances, &attributes, &emission);
+        let (lights, first_punctual) =
+            lights::build(emitters, &scene.lights, scene.sun.as_ref(), environment.is_some())?;
         for motion in &scene.motions {
             if motion.light as usize >= scene.lights.len() {
                 return Err(Error::bad_value("light motion", format!("there is no light {}", motion.light)));
@@ -237,6 +233,7 @@ impl FlatScene {
             meshes,
             instances,
             materials,
+            material_extensions,
             lights,
             first_punctual,
             motions: scene.motions.clone(),
@@ -293,6 +290,7 @@ impl FlatScene {
             + size_of_val(&self.attributes[..])
             + size_of::<super::gpu_types::Instance>() * self.instances.len()
             + size_of_val(&self.materials[..])
+            + size_of_val(&self.material_extensions[..])
             + size_of_val(&self.lights[..]);
         let textures: usize = self.textures.iter().map(|array| array.texels.len()).sum();
         (arrays + textures + environment) as u64

@@ -2,7 +2,8 @@
 
 use crate::error::{Error, Result};
 use crate::scene::gpu_types::{
-    BITANGENT_SHIFT, NONE, TRIANGLE_ALPHA_MASK, TRIANGLE_DOUBLE_SIDED, TRIANGLE_TANGENTS, Triangle, TriangleAttributes,
+    BITANGENT_SHIFT, NONE, SHAPE_SHIFT, TRIANGLE_ALPHA_MASK, TRIANGLE_DOUBLE_SIDED, TRIANGLE_TANGENTS, Triangle,
+    TriangleAttributes,
 };
 use crate::scene::{AlphaMode, MAX_COORDINATE, Mesh, Scene, octahedral};
 use glam::{Mat3, Mat4, Vec2, Vec3, Vec4};
@@ -24,8 +25,8 @@ impl Soup {
     pub fn add(&mut self, scene: &Scene, mesh: &Mesh, transform: Mat4) {
         let flags = scene.materials.get(mesh.material as usize).map_or(0, |material| {
             let masked = matches!(material.alpha, AlphaMode::Mask(_));
-            u32::from(material.double_sided) * TRIANGLE_DOUBLE_SIDED + u32::from(masked) * TRIANGLE_ALPHA_MASK
-        });
+            u32::from(material.is_two_sided()) * TRIANGLE_DOUBLE_SIDED + u32::from(masked) * TRIANGLE_ALPHA_MASK
+        }) | (mesh.shape as u32) << SHAPE_SHIFT;
         let placed = Placed::new(mesh, transform, flags);
         for corners in mesh.indices.as_chunks::<3>().0 {
             match placed.triangle(corners.map(|c| c as usize)) {

@@ -5,7 +5,8 @@ use super::packing::{MAX_ARRAYS, MAX_LAYERS, MAX_SIDE};
 use super::{FlatEnvironment, FlatScene, TextureArray};
 use crate::scene::bvh::{MAX_DEPTH, MAX_TOP_DEPTH};
 use crate::scene::gpu_types::{
-    LIGHT_ENVIRONMENT, LIGHT_TRIANGLE, Light, Material, NONE, TextureSlot, Triangle, TriangleAttributes,
+    LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, Material, MaterialExtensions, NONE, TextureSlot, Triangle,
+    TriangleAttributes,
 };
 use std::ops::Range;
 
@@ -18,6 +19,10 @@ pub(super) fn validate(scene: &FlatScene) -> Result<(), Fault> {
     each("triangles", &scene.triangles, |_, triangle| check_triangle(scene, triangle))?;
     each("attributes", &scene.attributes, |_, attributes| check_attributes(attributes))?;
     each("materials", &scene.materials, |_, material| check_material(&scene.textures, material))?;
+    let extensions = &scene.material_extensions;
+    let complete = extensions.is_empty() || extensions.len() == scene.materials.len();
+    must(complete, "not one a material").map_err(|what| fault("material extensions", what))?;
+    each("material extensions", extensions, |_, extensions| check_extensions(&scene.textures, extensions))?;
     each("lights", &scene.lights, |i, light| check_light(scene, i, light))?;
     emitters(scene)?;
     let punctual = (scene.lights.len() as u64).checked_sub(u64::from(scene.first_punctual));
@@ -171,7 +176,16 @@ fn check_material(textures: &[TextureArray], material: &Material) -> Result<(), 
         &material.normal_texture,
         &material.emissive_texture,
     ];
-    must(slots.into_iter().all(|slot| is_sound(textures, slot)), "a texture outside its array")
+    check_slots(textures, &slots)
+}
+
+fn check_extensions(textures: &[TextureArray], extensions: &MaterialExtensions) -> Result<(), &'static str> {
+    must(extensions.factors().iter().all(|f| f.is_finite()), "a factor that is not finite")?;
+    check_slots(textures, &extensions.slots())
+}
+
+fn check_slots(textures: &[TextureArray], slots: &[&TextureSlot]) -> Result<(), &'static str> {
+    must(slots.iter().all(|slot| is_sound(textures, slot)), "a texture outside its array")
 }
 
 /// Whether every level that a slot reads lies in its array.
@@ -199,6 +213,11 @@ fn check_light(scene: &FlatScene, index: usize, light: &Light) -> Result<(), &'s
     match light.kind {
         // That it is the triangle it says it is, `emitters` has seen.
         LIGHT_TRIANGLE => must(index < scene.first_punctual as usize, "a triangle out of place"),
+        LIGHT_SUN => {
+            let only_environment_follows =
+                scene.lights.get(index + 1..).is_some_and(|rest| rest.iter().all(|l| l.kind == LIGHT_ENVIRONMENT));
+            must(only_environment_follows && light.cos_outer > 0.0, "a sun out of place")
+        }
         LIGHT_ENVIRONMENT => must(is_last && scene.environment.is_some(), "an environment out of place"),
         kind => must(kind < LIGHT_ENVIRONMENT && index >= scene.first_punctual as usize, "an unknown kind"),
     }
