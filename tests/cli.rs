@@ -352,6 +352,7 @@ fn info_says_what_a_scene_holds() {
     }
     assert!(info["triangles"].as_u64().unwrap() >= 12 && info["lights"].as_u64().unwrap() >= 1, "{info}");
     assert!(info["warnings"].is_array() && !info["cameras"].as_array().unwrap().is_empty(), "{info}");
+    assert!(info["texture_arrays"].as_array().unwrap().is_empty(), "{info}");
     assert!(succeed(&["info", "builtin:cornell"]).contains("triangles"));
 }
 

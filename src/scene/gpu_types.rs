@@ -205,8 +205,8 @@ impl TextureSlot {
     /// Packs a slot. Numbers that do not fit lose their high bits.
     pub fn new(row_u: Vec3, row_v: Vec3, read: &TextureRead) -> Self {
         let TextureRead { array, layer, origin: [x, y], size: [width, height], wrap: [wrap_u, wrap_v], .. } = *read;
-        let place = (x / 8 & 0x3ff)
-            | (y / 8 & 0x3ff) << 10
+        let place = ((x / 8) & 0x3ff)
+            | ((y / 8) & 0x3ff) << 10
             | (layer & 0xff) << 20
             | (array & 3) << 28
             | (read.uv_set & 1) << 30
@@ -227,7 +227,7 @@ impl TextureSlot {
 
     /// What the slot says, or nothing if there is no texture.
     pub fn read(&self) -> Option<TextureRead> {
-        let bits = |word: u32, shift: u32, count: u32| word >> shift & ((1 << count) - 1);
+        let bits = |word: u32, shift: u32, count: u32| (word >> shift) & ((1 << count) - 1);
         let TextureSlot { place, size, .. } = *self;
         self.is_some().then(|| TextureRead {
             array: bits(place, 28, 2),
