@@ -220,8 +220,8 @@ fn history_follows_what_moves() {
         scene.rig.lights.clear();
         scene.rig.instances.clear();
     };
-    let kinds: [(&str, usize, &dyn Fn(&mut Scene)); 3] =
-        [("objects", 0, &objects), ("lights", 0, &lights), ("camera", 1, &camera)];
+    type Kind<'a> = (&'a str, usize, &'a dyn Fn(&mut Scene));
+    let kinds: [Kind; 3] = [("objects", 0, &objects), ("lights", 0, &lights), ("camera", 1, &camera)];
     for (what, index, keep) in kinds {
         let mut moving = scene();
         keep(&mut moving);

@@ -122,7 +122,7 @@ impl Reader<'_> {
             } else {
                 influence.weights = [1.0, 0.0, 0.0, 0.0];
             }
-            repaired += u64::from(!sound || !(sum > 0.0 && sum.is_finite()));
+            repaired += u64::from(!(sound && sum > 0.0 && sum.is_finite()));
             influences.push(influence);
         }
         if repaired > 0 {
