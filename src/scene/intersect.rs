@@ -92,9 +92,10 @@ pub fn intersect_triangle(triangle: &Triangle, origin: Vec3, direction: Vec3, t_
     let speed = direction.dot(normal).abs();
     let t = p0.dot(normal) / if is_front { -speed } else { speed };
     let hits = (is_front || is_back) && t > 0.0 && t < t_max;
-    // `min` and `max` rather than `clamp`, which does not bear a NaN.
-    let u = (w1 / sum).max(0.0).min(1.0);
-    hits.then_some((t, u, (w2 / sum).max(0.0).min(1.0 - u)))
+    // Not `clamp`, which does not bear a NaN.
+    let within = |weight: f32, most: f32| if weight > 0.0 { weight.min(most) } else { 0.0 };
+    let u = within(w1 / sum, 1.0);
+    hits.then_some((t, u, within(w2 / sum, 1.0 - u)))
 }
 
 /// A primitive that is no triangle: (t, u, v) as `intersect_shape` of `shaders/scene/bvh.wgsl`.
