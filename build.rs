@@ -1,8 +1,11 @@
-//! Makes the shader table: every pass under `shaders/` flattened, parsed, validated and reflected.
+//! Makes the shader table: every pass under `shaders/` flattened, parsed, validated and reflected. Makes the table of
+//! directional albedos that they read.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+#[path = "build/albedo.rs"]
+mod albedo;
 #[path = "src/gpu/binding_kind.rs"]
 mod binding_kind;
 #[path = "src/gpu/shader_source.rs"]
@@ -10,6 +13,7 @@ mod shader_source;
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-changed=build");
     println!("cargo:rerun-if-changed=src/gpu/binding_kind.rs");
     println!("cargo:rerun-if-changed=src/gpu/shader_source.rs");
     println!("cargo:rerun-if-changed=shaders");
@@ -58,6 +62,12 @@ fn main() {
     assert!(errors.is_empty(), "{} shader(s) failed:\n{}", errors.len(), errors.join("\n"));
     writeln!(table, "/// Every pass.\npub static ALL: &[&Shader] = &[{}];", list(&names, |n| format!("&{n}"))).unwrap();
     std::fs::write(out.join("shaders.rs"), table).expect("OUT_DIR is writable");
+    // A second of work, and the same for every shader: only when its source is newer.
+    let time = |path: &Path| std::fs::metadata(path).and_then(|m| m.modified()).ok();
+    let albedo = out.join("albedo.bin");
+    if time(&albedo).is_none() || time(&albedo) < time(&root.join("../build/albedo.rs")) {
+        std::fs::write(albedo, albedo::table()).expect("OUT_DIR is writable");
+    }
 }
 
 /// Every file with an entry point, relative to `root`.

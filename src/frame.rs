@@ -48,12 +48,12 @@ pub struct Frame {
     pub previous_environment_turn: Vec2,
     /// Index of the sun among the lights, or `NONE`.
     pub sun_light: u32,
+    /// 0 by ray cones, 1 always the finest.
+    pub texture_levels: u32,
     /// Unused.
     pub padding_0: u32,
     /// Unused.
     pub padding_1: u32,
-    /// Unused.
-    pub padding_2: u32,
 }
 }
 

@@ -6,15 +6,19 @@ use crate::gpu::Gpu;
 use crate::gpu::data_texture::DataTexture;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
-use crate::scene::flat::{FlatEnvironment, FlatInstance, levels};
+use crate::scene::flat::{FlatEnvironment, FlatInstance, TextureArray, levels};
 use crate::scene::gpu_types::{
-    BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, NONE, TRIANGLE_ALPHA_MASK,
+    BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, MATERIAL_UNLIT, MATERIAL_VOLUME,
+    MaterialExtensions, NONE, TRIANGLE_ALPHA_MASK,
 };
 use crate::scene::{FlatScene, Shape};
 use glam::{Mat4, Quat, UVec2, Vec3, Vec4};
 
 /// Triangles in the first of the two buffers: 128 MiB, what every WebGPU device can bind. As in `shaders/scene/data.wgsl`.
 const FIRST_TRIANGLES: usize = (128 << 20) / size_of::<crate::scene::gpu_types::Triangle>();
+
+/// The texture arrays as shaders name them. A scene may have fewer.
+const TEXTURE_ARRAYS: [&str; 4] = ["textures_0", "textures_1", "textures_2", "textures_3"];
 
 /// A [`FlatScene`] on the device.
 #[derive(Debug)]
@@ -25,12 +29,13 @@ pub struct GpuScene {
     lights: wgpu::Buffer,
     attributes: DataTexture,
     materials: DataTexture,
+    material_extensions: DataTexture,
     instances: DataTexture,
     /// Object to world of each instance in the frame that is uploaded.
     transforms: Vec<Mat4>,
     /// Index in `nodes` of the root of everything.
     top_level: u32,
-    atlas: wgpu::TextureView,
+    textures: [wgpu::TextureView; TEXTURE_ARRAYS.len()],
     environment_radiance: wgpu::TextureView,
     environment_alias: wgpu::TextureView,
     /// What stands in for a pyramid that there is not.
@@ -58,21 +63,17 @@ impl GpuScene {
             Ok(())
         };
         let side = limits.max_texture_dimension_2d;
-        texture_limit("the texture atlas", scene.atlas.size, side, "texels a side")?;
-        texture_limit("the texture atlas", scene.atlas.layers, limits.max_texture_array_layers, "layers")?;
+        for (i, array) in scene.textures.iter().enumerate() {
+            let what = format!("texture array {i}");
+            texture_limit(&what, array.width.max(array.height), side, "texels a side")?;
+            texture_limit(&what, array.layers, limits.max_texture_array_layers, "layers")?;
+        }
         if let Some(environment) = &scene.environment {
             texture_limit("the environment", environment.width.max(environment.height), side, "texels a side")?;
         }
-        let atlas = upload(
-            gpu,
-            "atlas",
-            [scene.atlas.size, scene.atlas.size, scene.atlas.layers],
-            wgpu::TextureFormat::Rgba8Unorm,
-            &scene.atlas.texels,
-        );
-        let black = ([1, 1, 1], vec![[0f32; 4]], vec![[0u32; 4]]);
+        let black = ([1, 1], vec![[0f32; 4]], vec![[0u32; 4]]);
         let (size, radiance, alias) = match &scene.environment {
-            Some(e) => ([e.width, e.height, 1], &e.radiance, &e.alias),
+            Some(e) => ([e.width, e.height], &e.radiance, &e.alias),
             None => (black.0, &black.1, &black.2),
         };
         let (first_triangles, rest) = scene.triangles.split_at(scene.triangles.len().min(FIRST_TRIANGLES));
@@ -88,6 +89,7 @@ impl GpuScene {
             ],
             attributes: DataTexture::new(gpu, "attributes", &scene.attributes)?,
             materials: DataTexture::new(gpu, "materials", &scene.materials)?,
+            material_extensions: DataTexture::new(gpu, "material extensions", &scene.material_extensions)?,
             instances: DataTexture::new(gpu, "instances", &instance_records(scene, &transforms, &transforms))?,
             transforms,
             top_level: scene.root(),
@@ -96,26 +98,21 @@ impl GpuScene {
             } else {
                 gpu.storage_of("lights", &scene.lights)?
             },
-            atlas: atlas.create_view(&wgpu::TextureViewDescriptor {
-                dimension: Some(wgpu::TextureViewDimension::D2Array),
-                ..Default::default()
-            }),
+            textures: std::array::from_fn(|i| texture_array(gpu, TEXTURE_ARRAYS[i], scene.textures.get(i))),
             environment_radiance: upload(
                 gpu,
                 "environment radiance",
                 size,
                 wgpu::TextureFormat::Rgba32Float,
                 bytemuck::cast_slice(radiance),
-            )
-            .create_view(&Default::default()),
+            ),
             environment_alias: upload(
                 gpu,
                 "environment alias table",
                 size,
                 wgpu::TextureFormat::Rgba32Uint,
                 bytemuck::cast_slice(alias),
-            )
-            .create_view(&Default::default()),
+            ),
             no_pyramid: gpu.texture("no pyramid", UVec2::ONE, wgpu::TextureFormat::Rgba32Float),
             pyramid: None,
             rest_positions: punctual.iter().map(|l| l.position).collect(),
@@ -158,8 +155,8 @@ impl GpuScene {
 
     /// Replaces the environment's radiance and alias table by those of a map of the same size.
     pub(crate) fn update_environment(&self, gpu: &Gpu, environment: &FlatEnvironment) {
-        write(gpu, self.environment_radiance.texture(), bytemuck::cast_slice(&environment.radiance));
-        write(gpu, self.environment_alias.texture(), bytemuck::cast_slice(&environment.alias));
+        write(gpu, self.environment_radiance.texture(), 0, 0, bytemuck::cast_slice(&environment.radiance));
+        write(gpu, self.environment_alias.texture(), 0, 0, bytemuck::cast_slice(&environment.alias));
     }
 
     /// What has to be made before the scene can be rendered.
@@ -211,8 +208,11 @@ impl GpuScene {
         recorder.share("lights", &self.lights);
         recorder.share("attributes", &self.attributes.view);
         recorder.share("materials", &self.materials.view);
+        recorder.share("material_extensions", &self.material_extensions.view);
         recorder.share("instances", &self.instances.view);
-        recorder.share("atlas", &self.atlas);
+        for (name, textures) in TEXTURE_ARRAYS.into_iter().zip(&self.textures) {
+            recorder.share(name, textures);
+        }
         recorder.share("environment_radiance", &self.environment_radiance);
         recorder.share("environment_alias", &self.environment_alias);
         let pyramid = self.pyramid.as_ref().map_or(&self.no_pyramid, |pyramid| &pyramid.view);
@@ -221,12 +221,12 @@ impl GpuScene {
 }
 
 fn features(scene: &FlatScene) -> SceneFeatures {
-    let slots = scene
-        .materials
-        .iter()
-        .flat_map(|m| [m.base_color_texture, m.metallic_roughness_texture, m.normal_texture, m.emissive_texture]);
+    let any = |has: fn(&MaterialExtensions) -> bool| scene.material_extensions.iter().any(has);
     SceneFeatures {
-        textures: slots.into_iter().any(|slot| slot.width > 0),
+        textures: !scene.textures.is_empty(),
+        textures_1: scene.textures.len() > 1,
+        textures_2: scene.textures.len() > 2,
+        textures_3: scene.textures.len() > 3,
         alpha_masks: scene.triangles.iter().any(|t| t.flags & TRIANGLE_ALPHA_MASK != 0),
         environment: environment_light(scene) != NONE,
         sun: sun_light(scene) != NONE,
@@ -235,6 +235,24 @@ fn features(scene: &FlatScene) -> SceneFeatures {
         punctual_lights: scene.lights.iter().any(|l| l.kind != LIGHT_TRIANGLE && !is_distant(l)),
         instances: scene.has_top_level(),
         many_triangles: scene.triangles.len() > FIRST_TRIANGLES,
+        transmission: any(|m| m.transmission > 0.0),
+        volumes: any(|m| m.flags & MATERIAL_VOLUME != 0),
+        dispersion: any(|m| m.flags & MATERIAL_VOLUME != 0 && m.dispersion > 0.0),
+        unlit: any(|m| m.flags & MATERIAL_UNLIT != 0),
+        anisotropy: any(|m| m.anisotropy > 0.0),
+        // Where a medium is outside, index 1.5 reflects something else.
+        specular: any(|m| {
+            m.ior != 1.5
+                || m.specular != 1.0
+                || m.specular_color != Vec3::ONE
+                || m.slots()[..2].iter().any(|slot| slot.read().is_some())
+                || m.flags & MATERIAL_VOLUME != 0
+        }),
+        sheen: any(|m| m.sheen_color != Vec3::ZERO),
+        clearcoat: any(|m| m.clearcoat > 0.0),
+        iridescence: any(|m| m.iridescence > 0.0),
+        energy_compensation: false,
+        conserving_mix: false,
     }
 }
 
@@ -271,40 +289,126 @@ fn distant_light(scene: &FlatScene, kind: u32) -> u32 {
     last.into_iter().find(|(_, light)| light.kind == kind).map_or(NONE, |(index, _)| index as u32)
 }
 
-fn upload(gpu: &Gpu, label: &str, size: [u32; 3], format: wgpu::TextureFormat, bytes: &[u8]) -> wgpu::Texture {
-    let [width, height, layers] = size;
-    let extent = wgpu::Extent3d { width, height, depth_or_array_layers: layers };
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+/// An array with all its levels; one white texel for an array that the scene does not have.
+fn texture_array(gpu: &Gpu, label: &str, array: Option<&TextureArray>) -> wgpu::TextureView {
+    let format = wgpu::TextureFormat::Rgba8Unorm;
+    let texture = match array {
+        Some(array) => {
+            let texture = create(gpu, label, [array.width, array.height, array.layers], array.levels, format);
+            for level in 0..array.levels {
+                for layer in 0..array.layers {
+                    let start = array.offset(level, layer, 0, 0);
+                    let end = start + array.layer_bytes(level) as usize;
+                    write(gpu, &texture, level, layer, array.texels.get(start..end).unwrap_or_default());
+                }
+            }
+            texture
+        }
+        None => {
+            let texture = create(gpu, label, [1; 3], 1, format);
+            write(gpu, &texture, 0, 0, &[u8::MAX; 4]);
+            texture
+        }
+    };
+    texture.create_view(&wgpu::TextureViewDescriptor {
+        dimension: Some(wgpu::TextureViewDimension::D2Array),
+        ..Default::default()
+    })
+}
+
+fn upload(gpu: &Gpu, label: &str, size: [u32; 2], format: wgpu::TextureFormat, texels: &[u8]) -> wgpu::TextureView {
+    let texture = create(gpu, label, [size[0], size[1], 1], 1, format);
+    write(gpu, &texture, 0, 0, texels);
+    texture.create_view(&Default::default())
+}
+
+fn create(gpu: &Gpu, label: &str, size: [u32; 3], levels: u32, format: wgpu::TextureFormat) -> wgpu::Texture {
+    let [width, height, depth_or_array_layers] = size;
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some(label),
-        size: extent,
-        mip_level_count: 1,
+        size: wgpu::Extent3d { width, height, depth_or_array_layers },
+        mip_level_count: levels,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
         format,
         usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
-    });
-    write(gpu, &texture, bytes);
-    texture
+    })
 }
 
-/// Replaces all texels.
-fn write(gpu: &Gpu, texture: &wgpu::Texture, bytes: &[u8]) {
-    let wgpu::Extent3d { width, height, .. } = texture.size();
+/// Writes one layer of one level, so that no staging copy is larger than that.
+fn write(gpu: &Gpu, texture: &wgpu::Texture, level: u32, layer: u32, texels: &[u8]) {
+    let (width, height) = ((texture.width() >> level).max(1), (texture.height() >> level).max(1));
     let row = width * texture.format().block_copy_size(None).unwrap_or(4);
-    // Layer by layer, so that no staging copy is larger than a layer.
-    let layer_bytes = row as usize * height as usize;
-    for (layer, data) in bytes.chunks_exact(layer_bytes).enumerate() {
-        gpu.queue.write_texture(
-            wgpu::TexelCopyTextureInfo {
-                texture,
-                mip_level: 0,
-                origin: wgpu::Origin3d { x: 0, y: 0, z: layer as u32 },
-                aspect: wgpu::TextureAspect::All,
-            },
-            data,
-            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: Some(height) },
-            wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        );
+    gpu.queue.write_texture(
+        wgpu::TexelCopyTextureInfo {
+            texture,
+            mip_level: level,
+            origin: wgpu::Origin3d { x: 0, y: 0, z: layer },
+            aspect: wgpu::TextureAspect::All,
+        },
+        texels,
+        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: Some(height) },
+        wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Clearcoat, Iridescence, Material, Scene, Sheen, Specular, Transmission, Volume, shapes};
+
+    /// Each extension puts in the code that it needs, and a scene without any puts in none.
+    #[test]
+    fn kernels_carry_what_materials_need() {
+        let of = |material: Material| {
+            let mesh = shapes::parallelogram(Vec3::ZERO, Vec3::X, Vec3::Y, 0);
+            let instances = vec![crate::scene::Instance { mesh: 0, transform: Mat4::IDENTITY }];
+            let scene = Scene { meshes: vec![mesh], instances, materials: vec![material], ..Scene::default() };
+            features(&FlatScene::build(&scene, &mut |_, _| ()).expect("a good scene"))
+        };
+        let plain = Material::default();
+        let none = SceneFeatures::NONE;
+        assert_eq!(of(plain.clone()), none);
+        let transmission = Transmission { factor: 0.1, texture: None };
+        let volume = Some(Volume { attenuation_distance: 1.0, attenuation_color: Vec3::ONE });
+        for (material, expected) in [
+            (Material { ior: 1.4, ..plain.clone() }, SceneFeatures { specular: true, ..none }),
+            (
+                Material { specular: Specular { strength: 0.5, ..Specular::default() }, ..plain.clone() },
+                SceneFeatures { specular: true, ..none },
+            ),
+            (Material { transmission, ..plain.clone() }, SceneFeatures { transmission: true, ..none }),
+            (
+                Material { transmission, volume, ..plain.clone() },
+                SceneFeatures { transmission: true, volumes: true, specular: true, ..none },
+            ),
+            (
+                Material { transmission, volume, dispersion: 0.1, ..plain.clone() },
+                SceneFeatures { transmission: true, volumes: true, specular: true, dispersion: true, ..none },
+            ),
+            (Material { unlit: true, ..plain.clone() }, SceneFeatures { unlit: true, ..none }),
+            (
+                Material { sheen: Sheen { color: Vec3::X, ..Sheen::default() }, ..plain.clone() },
+                SceneFeatures { sheen: true, ..none },
+            ),
+            (
+                Material { clearcoat: Clearcoat { factor: 0.1, ..Clearcoat::default() }, ..plain.clone() },
+                SceneFeatures { clearcoat: true, ..none },
+            ),
+            (
+                Material { iridescence: Iridescence { factor: 0.1, ..Iridescence::default() }, ..plain.clone() },
+                SceneFeatures { iridescence: true, ..none },
+            ),
+            (
+                Material {
+                    anisotropy: crate::scene::Anisotropy { strength: 0.1, ..Default::default() },
+                    ..plain.clone()
+                },
+                SceneFeatures { anisotropy: true, ..none },
+            ),
+        ] {
+            assert_eq!(of(material), expected);
+        }
     }
 }

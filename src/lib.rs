@@ -37,6 +37,7 @@ pub fn gpu_layouts() -> Vec<scene::gpu_types::Layout> {
         types::Instance::LAYOUT,
         types::TextureSlot::LAYOUT,
         types::Material::LAYOUT,
+        types::MaterialExtensions::LAYOUT,
         types::Light::LAYOUT,
         types::CameraView::LAYOUT,
         frame::Frame::LAYOUT,

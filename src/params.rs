@@ -226,12 +226,26 @@ params! {
         roulette_threshold: float(1.0, 0.001..=100.0, ""),
         /// Where in its pixel a primary ray goes: `box` anywhere in the square, which averages to a smooth picture; `center` through the middle, which keeps edges out of error measurements but aliases (biased against the box filter).
         pixel_filter: choice(0, ["box", "center"]),
+        /// Which mip level textures are read at: `cone` takes the one whose texels are as large as the ray is wide there, so that distant textures neither shimmer nor cost more than near ones (biased: what a pixel sees of a texture is blurred by up to about a pixel more); `finest` always reads level 0, for comparison with renderers that do so.
+        texture_levels: choice(0, ["cone", "finest"]),
+        /// Whether light that scatters more than once between microfacets is given back to the GGX reflection (Turquin 2019, thesis 000 2.1.3). On: rough metals are as bright as smooth ones. Off: as glTF's formula has it, which is darker.
+        energy_compensation: flag(false),
+        /// Whether the diffuse lobe gets only the light that the specular layer leaves over. On: energy is conserved. Off: as glTF's formula has it, which gains light at grazing angles.
+        conserving_mix: flag(false),
         /// How directions of the environment are drawn: from an `alias` table made when the scene is loaded, in constant time, or by descent of a `pyramid` made on the GPU every frame (002, section 5.3), which suits maps that change. The same density, so the same expected picture.
         environment_sampling: choice(0, ["alias", "pyramid"]),
         /// Turn of environment and sun about +Y, counter-clockwise as seen from above.
         environment_rotation: float(0.0, -360.0..=360.0, "degrees"),
         /// How fast they turn while frames are not accumulated.
         environment_rotation_rate: float(0.0, -360.0..=360.0, "degrees a second"),
+    }
+}
+
+impl RenderParams {
+    /// Puts in what changes the code of kernels.
+    pub fn specialise(&self, features: &mut crate::gpu::shader::SceneFeatures) {
+        features.energy_compensation = self.energy_compensation != 0;
+        features.conserving_mix = self.conserving_mix != 0;
     }
 }
 

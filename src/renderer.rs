@@ -383,6 +383,7 @@ impl Renderer {
         // Rays are counted by the frame, what was left out since the film began.
         recorder.encoder.clear_buffer(&self.film.counters, 0, if restart { None } else { Some(4) });
         self.gpu_scene.share(&mut recorder);
+        self.render_params.specialise(&mut recorder.features);
         self.film.share(&mut recorder);
         recorder.share("frame", &self.frame_uniform);
         self.gpu_scene.record(&mut recorder)?;
@@ -465,12 +466,12 @@ impl Renderer {
             history: self.previous_camera.is_some().into(),
             pixel_filter: self.render_params.pixel_filter,
             top_level: self.gpu_scene.top_level(),
+            texture_levels: self.render_params.texture_levels,
             sun_light: sun_light(&self.scene),
             environment_turn: self.environment_turn(self.moment),
             previous_environment_turn: self.environment_turn(self.previous_moment),
             padding_0: 0,
             padding_1: 0,
-            padding_2: 0,
         }
     }
 
@@ -523,6 +524,7 @@ impl Renderer {
     pub async fn read_auxiliary(&self) -> Result<Auxiliary> {
         let mut recorder = Recorder::new(&self.gpu, None);
         self.gpu_scene.share(&mut recorder);
+        self.render_params.specialise(&mut recorder.features);
         recorder.share("frame", &self.frame_uniform);
         recorder.share("visibility", &self.visibility[(self.frame_index.wrapping_sub(1) & 1) as usize]);
         record_auxiliary(&mut recorder, &self.albedo_depth, &self.normal, self.size())?;

@@ -393,7 +393,7 @@ fn planted_faults_are_found() {
         ("triangles[3]", |flat| flat.triangles[3].material = 4),
         ("triangles[3]", |flat| flat.triangles[3].light = 1000),
         ("triangles[3]", |flat| flat.triangles[3].p1.y = f32::INFINITY),
-        ("materials[0]", |flat| flat.materials[0].base_color_texture.x = u32::MAX),
+        ("materials[0]", |flat| flat.materials[0].base_color_texture.place |= 1 << 20),
         ("lights[0]", |flat| flat.lights[0].alias_light = 1000),
         ("lights[9]", |flat| flat.lights[9].kind = 9),
         ("motions[2]", |flat| flat.motions[2].light = 66),

@@ -6,6 +6,7 @@ mod support;
 use restir::gpu::shader::{Shader, table};
 use restir::scene::gpu_types::Layout;
 use std::collections::BTreeSet;
+use support::bsdf::Bsdf;
 use support::harness::{TestInput, TestOutput, TestRun};
 
 /// Bound structs that need no twin, with the reason.
@@ -13,7 +14,7 @@ const WITHOUT_TWIN: &[(&str, &str)] = &[("PassIndex", "one word, written as such
 
 fn registered() -> Vec<Layout> {
     let mut all = restir::gpu_layouts();
-    all.extend([TestInput::LAYOUT, TestOutput::LAYOUT, TestRun::LAYOUT]);
+    all.extend([TestInput::LAYOUT, TestOutput::LAYOUT, TestRun::LAYOUT, Bsdf::LAYOUT]);
     all
 }
 

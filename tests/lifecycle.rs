@@ -6,6 +6,7 @@ mod support;
 use glam::{Mat4, Vec3};
 use restir::params::{FilmParams, ParamKind, ParamSpec, Params, RenderParams};
 use restir::renderer::COMMON_VIEWS;
+use restir::scene::flat::TextureArray;
 use restir::scene::{Camera, Environment, Instance, Material, Scene, builtin, shapes};
 use restir::{Error, FlatScene, Renderer, techniques};
 use support::*;
@@ -390,7 +391,7 @@ fn what_does_not_fit_leaves_what_there_was() {
     assert_same(&render_clean(&mut renderer, 2, "after a setting"), &before, "after a setting");
 
     let mut large = support::builtin("cornell-64");
-    large.atlas.size = 1 << 20;
+    large.textures.push(TextureArray { width: 1 << 20, height: 1, layers: 1, levels: 1, texels: Vec::new() });
     assert!(matches!(renderer.set_scene(large), Err(Error::Limit { .. })));
     assert_eq!(renderer.scene().name, "cornell");
     renderer.reset();

@@ -12,7 +12,6 @@ use restir::scene::{Environment, FlatScene, Instance, Material, Scene, shapes};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use support::harness::{TestInput, eval_gpu, functions, scene_functions};
 use support::statistics::{chi_squared, significance, upper_gamma};
-use support::twins::Brdf;
 use support::{flatten, gpu};
 
 const SAMPLES: usize = 40_000;
@@ -158,102 +157,6 @@ fn warps_are_uniform_or_cosine() {
     let counts = histogram(256, outputs.iter().map(|(a, _)| triangle(*a)));
     assert_fits(&counts, &[1.0 / 256.0; 256], "triangle");
     assert_rejected(&counts, &rings, "triangle without the square root");
-}
-
-fn polar(theta: f64, phi: f64) -> DVec3 {
-    DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos())
-}
-
-fn brdf_samples(gpu: &Gpu, operation: u32, brdf: &Brdf, wo: DVec3, seed: u64) -> Vec<DVec3> {
-    let color = brdf.base_color.as_vec3();
-    let inputs: Vec<_> = uniform(SAMPLES, seed)
-        .iter()
-        .map(|u| {
-            let (a, b) = (color.extend(brdf.metallic as f32), wo.as_vec3().extend(brdf.alpha as f32));
-            TestInput::floats(&[a.to_array(), b.to_array(), *u])
-        })
-        .collect();
-    functions_of(gpu, operation, &inputs).iter().map(|(a, _)| direction(*a)).collect()
-}
-
-#[test]
-fn visible_normals_reflect_with_their_density() {
-    let gpu = gpu();
-    for (i, alpha) in [0.05, 0.2, 0.5, 1.0].into_iter().enumerate() {
-        for (j, theta) in [0.0, 0.6, 1.2, 1.4].into_iter().enumerate() {
-            let brdf = Brdf { base_color: DVec3::ONE, metallic: 1.0, alpha };
-            let wo = polar(theta, 0.7);
-            let samples = brdf_samples(&gpu, functions::GGX_SAMPLE, &brdf, wo, 100 + (4 * i + j) as u64);
-            assert!(samples.iter().all(|w| (w.length() - 1.0).abs() < 1e-4));
-            let counts = histogram(POLAR * AZIMUTH + 1, samples.into_iter().map(bin_of));
-            let what = format!("alpha {alpha}, theta {theta}");
-            assert_fits(&counts, &integrate(|wi| brdf.visible_normal_pdf(wo, wi)), &what);
-            let wrong = Brdf { alpha: 0.8 * alpha, ..brdf };
-            assert_rejected(&counts, &integrate(|wi| wrong.visible_normal_pdf(wo, wi)), &what);
-        }
-    }
-}
-
-#[test]
-fn the_whole_brdf_is_sampled_with_its_density() {
-    let gpu = gpu();
-    let mut seed = 200;
-    for alpha in [0.1, 0.5] {
-        for metallic in [0.0, 0.5, 1.0] {
-            for theta in [0.3, 1.3] {
-                seed += 1;
-                let brdf = Brdf { base_color: DVec3::new(0.8, 0.5, 0.2), metallic, alpha };
-                let wo = polar(theta, 2.0);
-                let samples = brdf_samples(&gpu, functions::BRDF_SAMPLE, &brdf, wo, seed);
-                let counts = histogram(POLAR * AZIMUTH + 1, samples.into_iter().map(bin_of));
-                let what = format!("alpha {alpha}, metallic {metallic}, theta {theta}");
-                assert_fits(&counts, &integrate(|wi| brdf.pdf(wo, wi)), &what);
-                let wrong = Brdf { alpha: 0.6 * alpha, ..brdf };
-                if metallic > 0.0 {
-                    assert_rejected(&counts, &integrate(|wi| wrong.pdf(wo, wi)), &what);
-                }
-                // The lobes mixed in another proportion.
-                let p = 0.6 * brdf.specular_probability(wo);
-                let mixed = |wi: DVec3| p * brdf.visible_normal_pdf(wo, wi) + (1.0 - p) * wi.z / PI;
-                if metallic > 0.0 {
-                    assert_rejected(&counts, &integrate(mixed), &what);
-                }
-            }
-        }
-    }
-}
-
-/// Over a white metal f cos / pdf is never more than 1, and its mean is the integral of f cos. Dielectrics are left out: the specification's Fresnel mix itself gains light at
-/// grazing angles. E[1 / pdf] over the hemisphere is its solid angle.
-#[test]
-fn sampled_energy_is_conserved() {
-    let gpu = gpu();
-    for alpha in [0.1, 0.3, 1.0] {
-        for theta in [0.0, 0.8, 1.4f64] {
-            let brdf = Brdf { base_color: DVec3::ONE, metallic: 1.0, alpha };
-            let wo = polar(theta, 1.0);
-            let samples = brdf_samples(&gpu, functions::BRDF_SAMPLE, &brdf, wo, 300);
-            let weights: Vec<f64> = samples
-                .iter()
-                .map(|wi| if wi.z <= 1e-6 { 0.0 } else { brdf.value(wo, *wi).x * wi.z / brdf.pdf(wo, *wi) })
-                .collect();
-            let mean = weights.iter().sum::<f64>() / SAMPLES as f64;
-            assert!(weights.iter().all(|w| *w < 1.001), "visible normals never weigh more than 1");
-            let albedo: f64 = quadrature(|wi| brdf.value(wo, wi).x * wi.z).iter().sum();
-            assert!((mean - albedo).abs() < 0.01, "alpha {alpha}, theta {theta}: {mean}, should be {albedo}");
-        }
-    }
-    // In closed form at alpha 1 and normal incidence, where D = 1 / pi: the integral of x / (1 + x) over x = cos(theta).
-    let rough = Brdf { base_color: DVec3::ONE, metallic: 1.0, alpha: 1.0 };
-    let albedo: f64 = quadrature(|wi| rough.value(DVec3::Z, wi).x * wi.z).iter().sum();
-    assert!((albedo - (1.0 - 2f64.ln())).abs() < 1e-4, "{albedo}");
-
-    let brdf = Brdf { base_color: DVec3::ONE, metallic: 0.0, alpha: 0.6 };
-    let wo = polar(0.5, 0.0);
-    let samples = brdf_samples(&gpu, functions::BRDF_SAMPLE, &brdf, wo, 301);
-    // Down to 6 degrees above the horizon, where 1 / pdf grows without bound.
-    let inverse = samples.iter().filter(|w| w.z > 0.1).map(|wi| 1.0 / brdf.pdf(wo, *wi)).sum::<f64>() / SAMPLES as f64;
-    assert!((inverse / (0.9 * TAU) - 1.0).abs() < 0.03, "solid angle {inverse}, should be {}", 0.9 * TAU);
 }
 
 /// A dim noisy sky with one texel of sun, over a floor.

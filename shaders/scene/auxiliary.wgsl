@@ -17,7 +17,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if pixel_has_surface(pixel) {
         let surface = load_pixel(pixel);
         let depth = dot(surface.position - frame.camera.position, frame.camera.forward);
-        albedo_depth = vec4f(surface.brdf.base_color, depth);
+        albedo_depth = vec4f(surface.bsdf.base_color, depth);
         normal = vec4f(surface.basis.normal, f32(surface.instance));
     }
     textureStore(albedo_depth_out, pixel, albedo_depth);

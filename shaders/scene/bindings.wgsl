@@ -35,9 +35,9 @@ struct Frame {
     environment_turn: vec2f, // cosine and sine of the turn of environment and sun about +Y
     previous_environment_turn: vec2f, // the same in the previous frame
     sun_light: u32, // index of the sun in `lights`, or NONE
+    texture_levels: u32, // TEXTURE_LEVELS_CONE or TEXTURE_LEVELS_FINEST
     padding_0: u32,
     padding_1: u32,
-    padding_2: u32,
 }
 
 struct BvhNode {
@@ -76,15 +76,12 @@ struct Instance {
     padding: u32,
 }
 
+// Packed as src/scene/gpu_types.rs says; unpacked in scene/texture.wgsl.
 struct TextureSlot {
     row_u: vec3f,
-    flags: u32,
+    place: u32,
     row_v: vec3f,
-    layer: u32,
-    x: u32,
-    y: u32,
-    width: u32, // 0: no texture
-    height: u32,
+    size: u32,
 }
 
 struct Material {
@@ -123,6 +120,9 @@ struct Light {
 // What the scene has, fixed when a pipeline is made (src/gpu_scene.rs), so that no kernel carries code that its scene
 // never runs. A software adapter executes both sides of a branch: there this is a factor of three.
 override scene_has_textures: bool = true;
+override scene_has_textures_1: bool = true;
+override scene_has_textures_2: bool = true;
+override scene_has_textures_3: bool = true;
 override scene_has_alpha_masks: bool = true;
 override scene_has_environment: bool = true;
 override scene_has_sun: bool = true;
@@ -144,7 +144,10 @@ override scene_has_many_triangles: bool = true;
 @group(0) @binding(5) var attributes: texture_2d<u32>;
 @group(0) @binding(6) var materials: texture_2d<u32>;
 @group(0) @binding(7) var instances: texture_2d<u32>;
-@group(0) @binding(8) var atlas: texture_2d_array<f32>;
-@group(0) @binding(9) var environment_radiance: texture_2d<f32>;
-@group(0) @binding(10) var environment_alias: texture_2d<u32>;
-@group(0) @binding(11) var environment_pyramid: texture_2d<f32>;
+@group(0) @binding(8) var environment_radiance: texture_2d<f32>;
+@group(0) @binding(9) var environment_alias: texture_2d<u32>;
+@group(0) @binding(10) var textures_0: texture_2d_array<f32>;
+@group(0) @binding(11) var textures_1: texture_2d_array<f32>;
+@group(0) @binding(12) var textures_2: texture_2d_array<f32>;
+@group(0) @binding(13) var textures_3: texture_2d_array<f32>;
+@group(0) @binding(16) var environment_pyramid: texture_2d<f32>;

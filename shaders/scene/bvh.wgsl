@@ -40,11 +40,12 @@ fn triangle_color(triangle: u32, uv: vec2f) -> vec4f {
     return (1.0 - uv.x - uv.y) * unpack_color(colors.x) + uv.x * unpack_color(colors.y) + uv.y * unpack_color(colors.z);
 }
 
-// Whether a masked triangle exists at a point of it.
+// Whether a masked triangle exists at a point of it. Read at level 0: a mean of alpha against a cutoff is not the part that
+// exists, and a surface must be there, or not, for every ray alike.
 fn passes_alpha(triangle: u32, uv: vec2f) -> bool {
     let material = load_material(load_triangle(triangle).material);
     let alpha = material.base_color.a * triangle_color(triangle, uv).a
-        * texture_read(material.base_color_texture, triangle_uvs(triangle, uv)).a;
+        * texture_read(material.base_color_texture, texture_finest(triangle_uvs(triangle, uv))).a;
     return alpha >= material.alpha_cutoff;
 }
 

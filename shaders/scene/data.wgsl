@@ -69,14 +69,13 @@ fn instance_first_light(instance: u32) -> u32 {
 }
 
 fn material_texel(material: u32, texel: u32) -> vec4u {
-    return textureLoad(materials, data_texel(material * 15u + texel), 0);
+    return textureLoad(materials, data_texel(material * 11u + texel), 0);
 }
 
 fn load_texture_slot(material: u32, texel: u32) -> TextureSlot {
     let u = material_texel(material, texel);
     let v = material_texel(material, texel + 1u);
-    let place = material_texel(material, texel + 2u);
-    return TextureSlot(bitcast<vec3f>(u.xyz), u.w, bitcast<vec3f>(v.xyz), v.w, place.x, place.y, place.z, place.w);
+    return TextureSlot(bitcast<vec3f>(u.xyz), u.w, bitcast<vec3f>(v.xyz), v.w);
 }
 
 fn load_material(material: u32) -> Material {
@@ -86,6 +85,6 @@ fn load_material(material: u32) -> Material {
         bitcast<vec4f>(material_texel(material, 0u)),
         bitcast<vec3f>(emissive.xyz), bitcast<f32>(emissive.w),
         bitcast<f32>(factors.x), bitcast<f32>(factors.y), bitcast<f32>(factors.z), factors.w,
-        load_texture_slot(material, 3u), load_texture_slot(material, 6u), load_texture_slot(material, 9u),
-        load_texture_slot(material, 12u));
+        load_texture_slot(material, 3u), load_texture_slot(material, 5u), load_texture_slot(material, 7u),
+        load_texture_slot(material, 9u));
 }

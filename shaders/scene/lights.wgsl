@@ -194,7 +194,7 @@ fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> L
             return LightContribution(direction, distance, vec3f(0.0), 0.0);
         }
         let free = max(distance - shadow_margin(instance, triangle, position) / cosine, 0.0);
-        return LightContribution(direction, free, emitted_radiance(triangle, uv) * (cosine / distance_2),
+        return LightContribution(direction, free, emitted_radiance(triangle, uv, cosine) * (cosine / distance_2),
             distance_2 / cosine);
     }
     if scene_has_environment && kind == LIGHT_ENVIRONMENT {

@@ -1,6 +1,7 @@
 // What a ray hit, ready for shading.
 #include "scene/bvh.wgsl"
-#include "lib/brdf.wgsl"
+#include "scene/ray_cone.wgsl"
+#include "scene/material_bsdf.wgsl"
 
 struct Surface {
     position: vec3f,
@@ -8,11 +9,19 @@ struct Surface {
     geometric_normal: vec3f, // unit, on the side of wo
     basis: Basis, // round the shading normal
     wo: vec3f, // unit, world space, towards the viewer
-    brdf: Brdf,
+    bsdf: Bsdf,
     emission: vec3f, // radiance towards wo
     instance: u32,
     triangle: u32,
     light: u32, // index of the light this surface is, or NONE
+    footprint: f32, // width of the cone that met it, in metres
+    is_front: bool,
+    material: u32,
+    // Of transmissive surfaces (scene/media.wgsl):
+    boundary: u32, // the material, if the surface bounds a medium, or NONE
+    specular_color: vec3f, // KHR_materials_specular, before the Fresnel term
+    absorption_above: vec3f, // of the medium on the side of wo, 1/m
+    absorption_below: vec3f,
 }
 
 fn decode_normal(packed: u32) -> vec3f {
@@ -102,23 +111,37 @@ fn triangle_error(instance: u32, triangle: u32, unit_normal: vec3f) -> f32 {
     return select(error, 4.0 * (error + 1.2e-7 * max(largest.x, max(largest.y, largest.z))), scene_has_instances);
 }
 
-// Radiance that a point of an emissive triangle sends out of its front; black where its alpha mask cuts it away.
-fn emitted_radiance(triangle: u32, uv: vec2f) -> vec3f {
+// Radiance that a point of an emissive triangle sends out of its front, at a cosine to its normal; black where its alpha
+// mask cuts it away. A clearcoat dims it (KHR_materials_clearcoat). Read at level 0 however it was found, and dimmed by the
+// mesh's own normal, so that a light is the same to the ray that hits it and to the sample that chose it.
+fn emitted_radiance(triangle: u32, uv: vec2f, cosine: f32) -> vec3f {
     let t = load_triangle(triangle);
     if scene_has_alpha_masks && (t.flags & TRIANGLE_ALPHA_MASK) != 0u && !passes_alpha(triangle, uv) {
         return vec3f(0.0);
     }
     let material = load_material(t.material);
-    if !scene_has_textures || material.emissive_texture.width == 0u {
-        return material.emissive;
+    let uvs = texture_finest(triangle_uvs(triangle, uv));
+    var radiance = material.emissive * texture_read(material.emissive_texture, uvs).rgb;
+    if scene_has_clearcoat {
+        let extensions = load_extensions(t.material);
+        let coat = extensions.clearcoat * texture_read(extensions.clearcoat_texture, uvs).r;
+        radiance *= 1.0 - coat * mix(CLEARCOAT_F0, 1.0, schlick_weight(cosine));
     }
-    return material.emissive * texture_read(material.emissive_texture, triangle_uvs(triangle, uv)).rgb;
+    return radiance;
 }
 
-// The interpolated normal of a triangle in its mesh's space, bent by its normal map, on the front side; unit.
-fn shading_normal(triangle: u32, uv: vec2f, uvs: vec4f) -> vec3f {
+// The frame of a triangle's point in its mesh's space, on the front side. MikkTSpace interpolates all three without
+// normalising.
+struct ShadingFrame {
+    tangent: vec3f,
+    bitangent: vec3f,
+    normal: vec3f,
+    has_tangents: bool,
+}
+
+fn shading_frame(triangle: u32, uv: vec2f) -> ShadingFrame {
     if is_sphere(load_triangle(triangle).flags) {
-        return sphere_normal(uv);
+        return ShadingFrame(vec3f(0.0), vec3f(0.0), sphere_normal(uv), false);
     }
     let w = vec3f(1.0 - uv.x - uv.y, uv.x, uv.y);
     let a = load_attributes(triangle);
@@ -126,34 +149,57 @@ fn shading_normal(triangle: u32, uv: vec2f, uvs: vec4f) -> vec3f {
     let n1 = decode_normal(a.normals.y);
     let n2 = decode_normal(a.normals.z);
     let sum = w.x * n0 + w.y * n1 + w.z * n2;
-    let has_normal = dot(sum, sum) > 1e-12;
-    let triangle_record = load_triangle(triangle);
-    let face = cross(triangle_record.p1 - triangle_record.p0, triangle_record.p2 - triangle_record.p0);
-    let n = normalize(select(face, sum, has_normal));
-    if !scene_has_textures || (triangle_record.flags & TRIANGLE_TANGENTS) == 0u {
-        return n;
+    let t = load_triangle(triangle);
+    let face = cross(t.p1 - t.p0, t.p2 - t.p0);
+    let n = select(normalize(face), sum, dot(sum, sum) > 1e-12);
+    if !(scene_has_textures || scene_has_anisotropy) || (t.flags & TRIANGLE_TANGENTS) == 0u {
+        return ShadingFrame(vec3f(0.0), vec3f(0.0), n, false);
     }
-    let material = load_material(triangle_record.material);
-    if material.normal_texture.width == 0u {
-        return n;
-    }
-    // MikkTSpace: interpolate tangent, bitangent and normal without normalising, then combine.
     let t0 = corner_tangent(n0, a.tangents_01 & 0xffffu);
     let t1 = corner_tangent(n1, a.tangents_01 >> 16u);
     let t2 = corner_tangent(n2, a.tangent_2 & 0xffffu);
-    let t = w.x * t0 + w.y * t1 + w.z * t2;
-    let b = w.x * bitangent_sign(a.tangent_2, 0u) * cross(n0, t0)
-        + w.y * bitangent_sign(a.tangent_2, 1u) * cross(n1, t1)
-        + w.z * bitangent_sign(a.tangent_2, 2u) * cross(n2, t2);
-    let texel = texture_read(material.normal_texture, uvs).xyz * 2.0 - 1.0;
-    let scale = material.normal_scale;
-    let bent = t * (texel.x * scale) + b * (texel.y * scale) + select(n, sum, has_normal) * texel.z;
+    return ShadingFrame(w.x * t0 + w.y * t1 + w.z * t2,
+        w.x * bitangent_sign(a.tangent_2, 0u) * cross(n0, t0)
+            + w.y * bitangent_sign(a.tangent_2, 1u) * cross(n1, t1)
+            + w.z * bitangent_sign(a.tangent_2, 2u) * cross(n2, t2),
+        n, true);
+}
+
+// The frame's normal, bent by a normal map; unit.
+fn mapped_normal(frame: ShadingFrame, map: TextureSlot, scale: f32, uvs: TextureCoordinates) -> vec3f {
+    let n = normalize(frame.normal);
+    if !scene_has_textures || !frame.has_tangents || !texture_exists(map) {
+        return n;
+    }
+    let texel = texture_read(map, uvs).xyz * 2.0 - 1.0;
+    let bent = frame.tangent * (texel.x * scale) + frame.bitangent * (texel.y * scale) + frame.normal * texel.z;
     return select(n, normalize(bent), dot(bent, bent) > 1e-12);
 }
 
-// The surface at a point of a triangle, seen from `wo` (unit, towards the viewer).
-fn load_surface(instance: u32, triangle: u32, uv: vec2f, wo: vec3f) -> Surface {
-    let uvs = triangle_uvs(triangle, uv);
+// The normal that a material is shaded with, in its mesh's space.
+fn shading_normal(triangle: u32, uv: vec2f, uvs: TextureCoordinates) -> vec3f {
+    let material = load_material(load_triangle(triangle).material);
+    return mapped_normal(shading_frame(triangle, uv), material.normal_texture, material.normal_scale, uvs);
+}
+
+// A normal of a mesh's front in the world, on the viewer's side. An interpolated or mapped normal may face away from the
+// viewer; it is bent back to the horizon, for the BSDF is defined only above it.
+fn viewed_normal(instance: u32, normal: vec3f, side: f32, wo: vec3f) -> vec3f {
+    var n = normal * side;
+    if scene_has_instances {
+        n = normalize(instance_normal(instance, n));
+    }
+    let facing = dot(n, wo);
+    if facing < 1e-3 {
+        n = normalize(n + wo * (1e-3 - facing));
+    }
+    return n;
+}
+
+// The surface at a point of a triangle, seen from `wo` (unit, towards the viewer) by a cone that is `footprint` metres
+// wide there.
+fn load_surface(instance: u32, triangle: u32, uv: vec2f, wo: vec3f, footprint: f32) -> Surface {
+    let uvs = texture_coordinates(instance, triangle, uv, wo, footprint);
     let triangle_record = load_triangle(triangle);
     let material = load_material(triangle_record.material);
     var surface: Surface;
@@ -161,40 +207,80 @@ fn load_surface(instance: u32, triangle: u32, uv: vec2f, wo: vec3f) -> Surface {
     surface.wo = wo;
     surface.instance = instance;
     surface.triangle = triangle;
+    surface.material = triangle_record.material;
+    surface.footprint = footprint;
     surface.light = triangle_record.light;
     if scene_has_instances && triangle_record.light != NONE {
         surface.light += instance_first_light(instance);
     }
 
     let front = front_normal(instance, triangle, uv);
-    let is_front = dot(front, wo) >= 0.0;
-    let side = select(-1.0, 1.0, is_front);
+    surface.is_front = dot(front, wo) >= 0.0;
+    let side = select(-1.0, 1.0, surface.is_front);
     surface.geometric_normal = front * side;
     surface.position_error = triangle_error(instance, triangle, front);
-    var n = shading_normal(triangle, uv, uvs) * side;
-    if scene_has_instances {
-        n = normalize(instance_normal(instance, n));
-    }
-    // An interpolated or mapped normal may face away from the viewer; bend it back to the horizon, for the BRDF is
-    // defined only above it.
-    let facing = dot(n, wo);
-    if facing < 1e-3 {
-        n = normalize(n + wo * (1e-3 - facing));
-    }
-    surface.basis = orthonormal_basis(n);
-
-    let metallic_roughness = texture_read(material.metallic_roughness_texture, uvs);
-    let roughness = clamp(material.roughness * metallic_roughness.g, 0.0, 1.0);
-    surface.brdf.base_color = clamp(material.base_color.rgb * triangle_color(triangle, uv).rgb
-        * texture_read(material.base_color_texture, uvs).rgb, vec3f(0.0), vec3f(1.0));
-    surface.brdf.metallic = clamp(material.metallic * metallic_roughness.b, 0.0, 1.0);
-    surface.brdf.alpha = max(roughness * roughness, MINIMUM_ALPHA);
+    let shading = shading_frame(triangle, uv);
+    let normal = mapped_normal(shading, material.normal_texture, material.normal_scale, uvs);
+    surface.basis = orthonormal_basis(viewed_normal(instance, normal, side, wo));
+    surface.bsdf = core_bsdf(material, uvs, triangle_color(triangle, uv).rgb);
 
     surface.emission = vec3f(0.0);
-    if surface.light != NONE && (is_front || material.double_sided == 1u) {
-        surface.emission = emitted_radiance(triangle, uv);
+    if surface.light != NONE && (surface.is_front || material.double_sided == 1u) {
+        surface.emission = emitted_radiance(triangle, uv, abs(dot(front, wo)));
     }
+    extend_surface(&surface, shading, uvs, side);
     return surface;
+}
+
+// Adds what the material has from glTF's extensions.
+fn extend_surface(surface: ptr<function, Surface>, shading: ShadingFrame, uvs: TextureCoordinates,
+    side: f32) {
+    let extensions = load_extensions((*surface).material);
+    var bsdf = (*surface).bsdf;
+    extend_bsdf(&bsdf, extensions, uvs);
+    if scene_has_anisotropy && shading.has_tangents {
+        let anisotropy = load_anisotropy(extensions, uvs);
+        var along = shading.tangent * anisotropy.direction.x + shading.bitangent * anisotropy.direction.y;
+        if scene_has_instances {
+            along = instance_vector((*surface).instance, TO_WORLD, along);
+        }
+        let n = (*surface).basis.normal;
+        let tangent = along - n * dot(n, along);
+        if anisotropy.strength > 0.0 && dot(tangent, tangent) > 1e-12 {
+            let t = normalize(tangent);
+            (*surface).basis = Basis(t, cross(n, t), n);
+            bsdf.alpha.x = mix(bsdf.alpha.x, 1.0, anisotropy.strength * anisotropy.strength);
+        }
+    }
+    if scene_has_clearcoat {
+        let normal = mapped_normal(shading, extensions.clearcoat_normal_texture, extensions.clearcoat_normal_scale, uvs);
+        bsdf.clearcoat_normal = basis_to_local((*surface).basis,
+            viewed_normal((*surface).instance, normal, side, (*surface).wo));
+    }
+    (*surface).boundary = NONE;
+    if scene_has_volumes && (extensions.flags & MATERIAL_VOLUME) != 0u {
+        (*surface).boundary = (*surface).material;
+    }
+    if scene_has_unlit && (extensions.flags & MATERIAL_UNLIT) != 0u {
+        // Shown as it is, and nothing reflected.
+        (*surface).emission = bsdf.base_color;
+        bsdf.base_color = vec3f(0.0);
+        bsdf.metallic = 0.0;
+        bsdf.f90 = 0.0;
+    }
+    if scene_has_specular {
+        (*surface).specular_color =
+            extensions.specular_color * texture_read(extensions.specular_color_texture, uvs).rgb;
+        bsdf.f0 = dielectric_f0(extensions.ior, (*surface).specular_color, bsdf.f90);
+    } else {
+        bsdf.f0 *= bsdf.f90;
+    }
+    (*surface).bsdf = bsdf;
+    if scene_has_volumes {
+        let own = (*surface).boundary;
+        surface_set_media(surface, select(own, NONE, (*surface).is_front), select(NONE, own, (*surface).is_front),
+            ALL_CHANNELS);
+    }
 }
 
 // Whether a direction leaves the surface on the viewer's side of the real geometry.
@@ -202,23 +288,86 @@ fn above_surface(surface: Surface, wi: vec3f) -> bool {
     return dot(surface.geometric_normal, wi) > 0.0;
 }
 
-// f(wo, wi) |cos| for a world direction; zero below the geometric or the shading horizon.
-fn surface_evaluate(surface: Surface, wi: vec3f) -> vec3f {
-    if !above_surface(surface, wi) {
+// The index of refraction of a medium for a colour: red, green or blue counted from 1, or ALL_CHANNELS
+// (KHR_materials_dispersion's spread over three colours).
+const ALL_CHANNELS = 0u;
+
+fn medium_ior(medium: u32, channel: u32) -> f32 {
+    if medium == NONE {
+        return 1.0;
+    }
+    let factors = extension_factors(medium, 3u); // index of refraction, dispersion
+    if !scene_has_dispersion || channel == ALL_CHANNELS {
+        return factors.x;
+    }
+    let half_spread = (factors.x - 1.0) * 0.025 * factors.y;
+    return max(factors.x + (f32(channel) - 2.0) * half_spread, 1.0);
+}
+
+fn medium_absorption(medium: u32) -> vec3f {
+    if medium == NONE {
         return vec3f(0.0);
     }
-    return brdf_evaluate(surface.brdf, basis_to_local(surface.basis, surface.wo), basis_to_local(surface.basis, wi));
+    return extension_factors(medium, 1u).xyz;
+}
+
+// Index-matched media are kept this far apart: at 1 a refraction's half vector has no direction.
+const MINIMUM_BEND = 0.002;
+
+// Tells a surface which media are above and below it.
+fn surface_set_media(surface: ptr<function, Surface>, above: u32, below: u32, channel: u32) {
+    (*surface).absorption_above = medium_absorption(above);
+    (*surface).absorption_below = medium_absorption(below);
+    // What is no boundary reflects by its own index, whatever lies behind it.
+    let is_boundary = (*surface).boundary != NONE;
+    let own = select((*surface).material, below, is_boundary);
+    let eta = medium_ior(own, channel) / medium_ior(above, channel);
+    (*surface).bsdf.f0 = dielectric_f0(eta, (*surface).specular_color, (*surface).bsdf.f90);
+    if is_boundary {
+        let least = select(1.0 - MINIMUM_BEND, 1.0 + MINIMUM_BEND, (*surface).is_front);
+        (*surface).bsdf.eta = select(eta, least, abs(eta - 1.0) < MINIMUM_BEND);
+    }
+}
+
+// f(wo, wi) |cos| of the lobes of a mask for a world direction. A direction must lie on the same side of the geometric
+// and of the shading surface; else nothing is scattered there.
+fn surface_evaluate_lobes(surface: Surface, lobes: u32, wi: vec3f) -> vec3f {
+    let local = basis_to_local(surface.basis, wi);
+    if above_surface(surface, wi) != (local.z > 0.0) {
+        return vec3f(0.0);
+    }
+    return bsdf_evaluate(surface.bsdf, lobes, basis_to_local(surface.basis, surface.wo), local);
+}
+
+// The same of all lobes.
+fn surface_evaluate(surface: Surface, wi: vec3f) -> vec3f {
+    return surface_evaluate_lobes(surface, LOBE_ALL, wi);
+}
+
+// What a medium leaves of light over `distance` from the surface along wi (Beer and Lambert).
+fn surface_transmittance(surface: Surface, wi: vec3f, distance: f32) -> vec3f {
+    if !scene_has_volumes {
+        return vec3f(1.0);
+    }
+    return exp(-distance * select(surface.absorption_below, surface.absorption_above, above_surface(surface, wi)));
+}
+
+// What the surface scatters towards wo of radiance that starts out at `distance` along wi: f |cos| and what the medium
+// leaves of it.
+fn surface_scatter(surface: Surface, wi: vec3f, distance: f32) -> vec3f {
+    return surface_evaluate(surface, wi) * surface_transmittance(surface, wi, distance);
 }
 
 // Density per solid angle with which `surface_sample` draws wi.
 fn surface_pdf(surface: Surface, wi: vec3f) -> f32 {
-    return brdf_pdf(surface.brdf, basis_to_local(surface.basis, surface.wo), basis_to_local(surface.basis, wi));
+    return bsdf_pdf(surface.bsdf, LOBE_ALL, basis_to_local(surface.basis, surface.wo), basis_to_local(surface.basis, wi));
 }
 
-// A world direction drawn for the BRDF; may point below the surface, where everything is zero.
+// A world direction drawn for the BSDF, above or below the surface; in the horizon, where everything is zero, if nothing
+// was drawn.
 fn surface_sample(surface: Surface, u: vec3f) -> vec3f {
     return normalize(basis_to_world(surface.basis,
-        brdf_sample(surface.brdf, basis_to_local(surface.basis, surface.wo), u)));
+        bsdf_sample(surface.bsdf, LOBE_ALL, basis_to_local(surface.basis, surface.wo), u).wi));
 }
 
 // Where a ray that leaves the surface towards `direction` begins: off the surface on that side, by no more than rounding
@@ -228,8 +377,8 @@ fn ray_origin(surface: Surface, direction: vec3f) -> vec3f {
     return surface.position + surface.geometric_normal * (side * surface.position_error);
 }
 
-// Whether nothing stands between the surface and the point at `distance` along wi. The ray starts a little above the
-// surface and still ends in that point: moved as a whole, it could run into a light before its end.
+// Whether nothing stands between the surface and the point at `distance` along wi. The ray starts a little off the
+// surface, on the side of wi, and still ends in that point: moved as a whole, it could run into a light before its end.
 fn is_visible(surface: Surface, wi: vec3f, distance: f32) -> bool {
     let origin = ray_origin(surface, wi);
     let direction = wi - (origin - surface.position) / max(distance, 1e-12);

@@ -9,9 +9,16 @@ fn pixel_has_surface(pixel: vec2u) -> bool {
     return textureLoad(visibility, pixel, 0).x != NONE;
 }
 
+// The surface at a point of a triangle, as a pixel of `camera` sees it.
+fn load_seen(camera: CameraView, instance: u32, triangle: u32, uv: vec2f) -> Surface {
+    let position = triangle_point(instance, triangle, uv);
+    return load_surface(instance, triangle, uv, direction_to_camera(camera, position),
+        camera_footprint(camera, position));
+}
+
 // The surface at a pixel that has one.
 fn load_pixel(pixel: vec2u) -> Surface {
     let v = textureLoad(visibility, pixel, 0);
     let uv = bitcast<vec2f>(v.zw);
-    return load_surface(v.x, v.y, uv, direction_to_camera(frame.camera, triangle_point(v.x, v.y, uv)));
+    return load_seen(frame.camera, v.x, v.y, uv);
 }

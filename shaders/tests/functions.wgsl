@@ -2,7 +2,7 @@
 // One invocation: one evaluation of the operation asked for. Reads one input. Writes one output.
 #include "tests/harness.wgsl"
 #include "lib/rng.wgsl"
-#include "lib/brdf.wgsl"
+#include "lib/sampling.wgsl"
 #include "lib/color.wgsl"
 #include "lib/mis.wgsl"
 #include "lib/reservoir.wgsl"
@@ -13,10 +13,6 @@ const RANDOM = 1u;
 const OCTAHEDRAL = 2u;
 const BASIS = 3u;
 const WARPS = 4u;
-const BRDF = 5u;
-const BRDF_SAMPLE = 6u;
-const GGX_SAMPLE = 7u;
-const GGX_PDF = 8u;
 const SRGB = 9u;
 const TONE_MAP = 10u;
 const MIS_WEIGHT = 11u;
@@ -38,9 +34,6 @@ fn stream_of(weights: vec4f, first: u32, count: u32, rng: ptr<function, Rng>) ->
 fn evaluate(operation: u32, input: TestInput) -> TestOutput {
     let a = float(input.a);
     let b = float(input.b);
-    let c = float(input.c);
-    // The layout of every operation on a BRDF.
-    let brdf = Brdf(a.xyz, a.w, b.w);
     switch operation {
         case PCG4D: { return TestOutput(pcg4d(input.a), vec4u(0u)); }
         case RANDOM: {
@@ -60,16 +53,6 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
             return TestOutput(bits(vec4f(sample_disk(a.xy), sample_triangle(a.xy))),
                 bits_3(sample_cosine_hemisphere(a.xy), 0.0));
         }
-        case BRDF: {
-            return TestOutput(bits_3(brdf_evaluate(brdf, b.xyz, c.xyz), brdf_pdf(brdf, b.xyz, c.xyz)),
-                bits(vec4f(specular_probability(brdf, b.xyz), 0.0, 0.0, 0.0)));
-        }
-        case BRDF_SAMPLE: { return TestOutput(bits_3(brdf_sample(brdf, b.xyz, c.xyz), 0.0), vec4u(0u)); }
-        case GGX_SAMPLE: {
-            let normal = ggx_sample_visible_normal(brdf.alpha, b.xyz, c.xy);
-            return TestOutput(bits_3(reflect(-b.xyz, normal), 0.0), vec4u(0u));
-        }
-        case GGX_PDF: { return TestOutput(bits(vec4f(ggx_pdf(brdf.alpha, b.xyz, c.xyz))), vec4u(0u)); }
         case SRGB: { return TestOutput(bits_3(srgb_encode(a.xyz), 0.0), bits_3(srgb_decode(a.xyz), 0.0)); }
         case TONE_MAP: { return TestOutput(bits_3(tone_map(input.a.w, a.xyz), 0.0), vec4u(0u)); }
         case MIS_WEIGHT: { return TestOutput(bits(vec4f(mis_weight(input.a.z, a.x, a.y))), vec4u(0u)); }

@@ -14,6 +14,7 @@ const ENVIRONMENT_SAMPLE = 5u;
 const CAMERA = 6u;
 const SHADING_NORMAL = 8u;
 const SHADOW_RAY = 9u;
+const FOOTPRINT = 20u;
 const PYRAMID_SAMPLE = 10u;
 
 fn evaluate(operation: u32, input: TestInput) -> TestOutput {
@@ -21,7 +22,8 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
     let b = float(input.b);
     switch operation {
         case TEXTURE_READ: {
-            return TestOutput(bits(texture_read(load_material(input.b.x).base_color_texture, a)), vec4u(0u));
+            return TestOutput(bits(texture_read(load_material(input.b.x).base_color_texture,
+                TextureCoordinates(a, b.yz))), vec4u(0u));
         }
         case LIGHT_SAMPLE: {
             var rng = rng_new(input.a.xy, 0u, input.a.z, 0u);
@@ -65,7 +67,7 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
         }
         // At the point b.xy of the triangle input.a.x.
         case SHADING_NORMAL: {
-            return TestOutput(bits_3(shading_normal(input.a.x, b.xy, triangle_uvs(input.a.x, b.xy)), 0.0), vec4u(0u));
+            return TestOutput(bits_3(shading_normal(input.a.x, b.xy, texture_finest(triangle_uvs(input.a.x, b.xy))), 0.0), vec4u(0u));
         }
         // Whether a surface at a, normal b, sees the light sample c.xy, and what that sends there.
         case SHADOW_RAY: {
@@ -76,6 +78,11 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
             let light = light_contribution(LightSample(input.c.x, input.c.y), a.xyz, false);
             let is_lit = is_visible(surface, light.direction, light.distance);
             return TestOutput(bits_3(light.value, light.distance), vec4u(u32(is_lit), 0u, 0u, 0u));
+        }
+        // Of a cone a.w wide that meets the triangle b.x from a.xyz: what it covers of a texture, and how wide it goes on.
+        case FOOTPRINT: {
+            let areas = texture_coordinates(0u, input.b.x, vec2f(0.3), a.xyz, a.w).areas;
+            return TestOutput(bits(vec4f(areas, scattered_spread(0u, input.b.x, b.y, a.w, b.z), 0.0)), vec4u(0u));
         }
         default: { return TestOutput(vec4u(0u), vec4u(0u)); }
     }

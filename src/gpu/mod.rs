@@ -1,5 +1,6 @@
 //! The device: adapter and limits, device loss, pipelines, buffers, textures and read-back.
 
+pub mod albedo_table;
 pub mod data_texture;
 pub mod readback;
 pub mod recorder;
@@ -41,6 +42,7 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
     /// Whether compute passes can be timed.
     pub has_timestamps: bool,
+    albedo_table: wgpu::TextureView,
     adapter: wgpu::AdapterInfo,
     failure: Arc<Mutex<Option<String>>>,
     pipelines: Arc<Mutex<HashMap<PipelineKey, Pipeline>>>,
@@ -117,6 +119,7 @@ impl Gpu {
             }
         });
         Ok(Gpu {
+            albedo_table: albedo_table::upload(&device, &queue),
             device,
             queue,
             has_timestamps,

@@ -86,7 +86,8 @@ impl<'a> Recorder<'a> {
         if let Some(timer) = timer.as_mut() {
             timer.clear();
         }
-        Recorder { gpu, encoder: frame_encoder(gpu), timer, shared: Vec::new(), features: SceneFeatures::ALL }
+        let shared = vec![("albedo_table", Resource::Texture(&gpu.albedo_table))];
+        Recorder { gpu, encoder: frame_encoder(gpu), timer, shared, features: SceneFeatures::ALL }
     }
 
     /// Binds a resource for every later pass that asks for it by name.

@@ -57,23 +57,37 @@ pub mod table {
 /// Declares the features once: the struct, its extremes, and the WGSL `override` (`scene_has_NAME`) of each.
 macro_rules! scene_features {
     ($($(#[$meta:meta])* $name:ident,)*) => {
-        /// What a scene has: kernels leave out the code for what it has not.
+        /// What a scene has, and settings that change code: kernels leave out the code for what is not there.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-        pub struct SceneFeatures { $($(#[$meta])* pub $name: bool,)* }
+        pub struct SceneFeatures {
+            $($(#[$meta])* pub $name: bool,)*
+            /// The setting `render.energy_compensation`.
+            pub energy_compensation: bool,
+            /// The setting `render.conserving_mix`.
+            pub conserving_mix: bool,
+        }
 
         impl SceneFeatures {
-            /// Everything: right for every scene, fast for few.
-            pub const ALL: Self = SceneFeatures { $($name: true,)* };
+            /// Everything, with settings at their defaults: right for every scene, fast for few.
+            pub const ALL: Self =
+                SceneFeatures { $($name: true,)* energy_compensation: false, conserving_mix: false };
             /// Nothing: single-sided triangles that shine evenly.
-            pub const NONE: Self = SceneFeatures { $($name: false,)* };
+            pub const NONE: Self =
+                SceneFeatures { $($name: false,)* energy_compensation: false, conserving_mix: false };
 
             /// The names of the `override` declarations.
-            pub const OVERRIDES: &[&str] = &[$(concat!("scene_has_", stringify!($name)),)*];
+            pub const OVERRIDES: &[&str] = &[
+                $(concat!("scene_has_", stringify!($name)),)*
+                "energy_compensation",
+                "conserving_mix",
+            ];
 
             /// The value of the shader's `override` of this name.
             fn has(self, name: &str) -> bool {
                 match name {
                     $(concat!("scene_has_", stringify!($name)) => self.$name,)*
+                    "energy_compensation" => self.energy_compensation,
+                    "conserving_mix" => self.conserving_mix,
                     _ => true,
                 }
             }
@@ -84,6 +98,12 @@ macro_rules! scene_features {
 scene_features! {
     /// Any texture.
     textures,
+    /// A second texture array.
+    textures_1,
+    /// A third texture array.
+    textures_2,
+    /// A fourth texture array.
+    textures_3,
     /// Any triangle whose alpha has to be tested.
     alpha_masks,
     /// An environment.
@@ -100,6 +120,24 @@ scene_features! {
     instances,
     /// More triangles than one storage binding holds.
     many_triangles,
+    /// Any material that transmits light.
+    transmission,
+    /// Any material that bounds a medium.
+    volumes,
+    /// Any medium that bends colours apart.
+    dispersion,
+    /// Any material without lighting.
+    unlit,
+    /// Any material with highlights stretched along a direction.
+    anisotropy,
+    /// Any material whose dielectric reflection is not that of index 1.5.
+    specular,
+    /// Any material with sheen.
+    sheen,
+    /// Any material with a clearcoat.
+    clearcoat,
+    /// Any material with a thin film.
+    iridescence,
 }
 
 /// A pipeline and the layouts its bind groups are made with.

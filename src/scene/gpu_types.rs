@@ -163,29 +163,87 @@ pub struct Instance {
 }
 
 gpu_struct! {
-/// How a material reads one texture: 48 bytes. `width == 0` means no texture.
+/// How a material reads one texture: 32 bytes. [`TextureSlot::read`] says what is packed in `place` and `size`.
 pub struct TextureSlot {
     /// First two rows of the UV transform: u' = dot(row_u.xyz, (u, v, 1)).
     pub row_u: Vec3,
-    /// Packed: bit 0 UV set, bit 1 sRGB, bit 2 linear filter, bits 4-5 wrap u, bits 6-7 wrap v (0 repeat, 1 mirror, 2 clamp).
-    pub flags: u32,
+    /// From the lowest bit: x / 8 and y / 8 (10 bits each), layer (8), array (2), UV set, 1 if there is a texture.
+    pub place: u32,
     /// v' = dot(row_v.xyz, (u, v, 1)).
     pub row_v: Vec3,
-    /// Layer of the atlas.
-    pub layer: u32,
-    /// First texel in the layer: x.
-    pub x: u32,
-    /// First texel in the layer: y.
-    pub y: u32,
-    /// Width in texels; 0 for no texture.
-    pub width: u32,
-    /// Height in texels.
-    pub height: u32,
+    /// From the lowest bit: width - 1 and height - 1 (13 bits each), wrap u and wrap v (2 each: 0 repeat, 1 mirror,
+    /// 2 clamp), sRGB, linear filter.
+    pub size: u32,
 }
 }
 
+/// What a [`TextureSlot`] says, unpacked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TextureRead {
+    /// Which texture array, 0 to 3.
+    pub array: u32,
+    /// Layer of the array, 0 to 255.
+    pub layer: u32,
+    /// First texel in the layer: x and y, multiples of 8. In level k it is `origin >> k`.
+    pub origin: [u32; 2],
+    /// Width and height in texels, 1 to 8192. In level k `max(1, size >> k)`.
+    pub size: [u32; 2],
+    /// Which texture coordinates, 0 or 1.
+    pub uv_set: u32,
+    /// Whether RGB is encoded.
+    pub srgb: bool,
+    /// Whether level 0 is interpolated.
+    pub linear_filter: bool,
+    /// Along u and v: 0 repeat, 1 mirror, 2 clamp.
+    pub wrap: [u32; 2],
+}
+
+impl TextureSlot {
+    /// No texture: white.
+    pub const NONE: Self = TextureSlot { row_u: Vec3::ZERO, place: 0, row_v: Vec3::ZERO, size: 0 };
+
+    /// Packs a slot. Numbers that do not fit lose their high bits.
+    pub fn new(row_u: Vec3, row_v: Vec3, read: &TextureRead) -> Self {
+        let TextureRead { array, layer, origin: [x, y], size: [width, height], wrap: [wrap_u, wrap_v], .. } = *read;
+        let place = (x / 8 & 0x3ff)
+            | (y / 8 & 0x3ff) << 10
+            | (layer & 0xff) << 20
+            | (array & 3) << 28
+            | (read.uv_set & 1) << 30
+            | 1 << 31;
+        let size = (width.wrapping_sub(1) & 0x1fff)
+            | (height.wrapping_sub(1) & 0x1fff) << 13
+            | (wrap_u & 3) << 26
+            | (wrap_v & 3) << 28
+            | u32::from(read.srgb) << 30
+            | u32::from(read.linear_filter) << 31;
+        TextureSlot { row_u, place, row_v, size }
+    }
+
+    /// Whether there is a texture.
+    pub fn is_some(&self) -> bool {
+        self.place >> 31 == 1
+    }
+
+    /// What the slot says, or nothing if there is no texture.
+    pub fn read(&self) -> Option<TextureRead> {
+        let bits = |word: u32, shift: u32, count: u32| word >> shift & ((1 << count) - 1);
+        let TextureSlot { place, size, .. } = *self;
+        self.is_some().then(|| TextureRead {
+            array: bits(place, 28, 2),
+            layer: bits(place, 20, 8),
+            origin: [bits(place, 0, 10) * 8, bits(place, 10, 10) * 8],
+            size: [bits(size, 0, 13) + 1, bits(size, 13, 13) + 1],
+            uv_set: bits(place, 30, 1),
+            srgb: bits(size, 30, 1) == 1,
+            linear_filter: bits(size, 31, 1) == 1,
+            wrap: [bits(size, 26, 2), bits(size, 28, 2)],
+        })
+    }
+}
+
 gpu_struct! {
-/// glTF metallic-roughness material: 240 bytes, fifteen texels of the data texture `materials`, read by
+/// glTF metallic-roughness material: 176 bytes, eleven texels of the data texture `materials`, read by
 /// `load_material`.
 pub struct Material {
     /// Linear base colour and alpha.
@@ -211,6 +269,106 @@ pub struct Material {
     /// Emission, sRGB.
     pub emissive_texture: TextureSlot,
 }
+}
+
+/// [`MaterialExtensions::flags`]: KHR_materials_unlit.
+pub const MATERIAL_UNLIT: u32 = 1;
+/// [`MaterialExtensions::flags`]: the surface bounds a medium (KHR_materials_volume).
+pub const MATERIAL_VOLUME: u32 = 2;
+
+gpu_struct! {
+/// What glTF's extensions add to a [`Material`]: 464 bytes, 29 texels of the data texture `material_extensions`. A scene
+/// that uses none has none.
+pub struct MaterialExtensions {
+    /// Multiplies the dielectric's reflectance at normal incidence.
+    pub specular_color: Vec3,
+    /// Strength of the dielectric's reflection.
+    pub specular: f32,
+    /// Absorption coefficient of the medium below, 1/m.
+    pub absorption: Vec3,
+    /// Share of light that passes through.
+    pub transmission: f32,
+    /// Sheen colour.
+    pub sheen_color: Vec3,
+    /// Sheen roughness.
+    pub sheen_roughness: f32,
+    /// Index of refraction; 0 for a perfect reflector.
+    pub ior: f32,
+    /// 20 over the Abbe number.
+    pub dispersion: f32,
+    /// Strength of the clearcoat.
+    pub clearcoat: f32,
+    /// Roughness of the clearcoat.
+    pub clearcoat_roughness: f32,
+    /// Cosine and sine of the anisotropy's rotation from the tangent.
+    pub anisotropy_direction: Vec2,
+    /// Strength of the anisotropy.
+    pub anisotropy: f32,
+    /// Normal-map scale of the clearcoat.
+    pub clearcoat_normal_scale: f32,
+    /// Strength of the thin film.
+    pub iridescence: f32,
+    /// Index of refraction of the film.
+    pub film_ior: f32,
+    /// Nanometres where the thickness texture is 0.
+    pub film_thickness_minimum: f32,
+    /// Nanometres where it is 1.
+    pub film_thickness_maximum: f32,
+    /// `MATERIAL_*` bits.
+    pub flags: u32,
+    /// Unused.
+    pub padding_0: u32,
+    /// Unused.
+    pub padding_1: u32,
+    /// Unused.
+    pub padding_2: u32,
+    /// Alpha: specular strength.
+    pub specular_texture: TextureSlot,
+    /// Specular colour, sRGB.
+    pub specular_color_texture: TextureSlot,
+    /// Red: transmission.
+    pub transmission_texture: TextureSlot,
+    /// Red: clearcoat.
+    pub clearcoat_texture: TextureSlot,
+    /// Green: clearcoat roughness.
+    pub clearcoat_roughness_texture: TextureSlot,
+    /// Tangent-space normals of the clearcoat.
+    pub clearcoat_normal_texture: TextureSlot,
+    /// Sheen colour, sRGB.
+    pub sheen_color_texture: TextureSlot,
+    /// Alpha: sheen roughness.
+    pub sheen_roughness_texture: TextureSlot,
+    /// Red and green a direction, blue the strength of the anisotropy.
+    pub anisotropy_texture: TextureSlot,
+    /// Red: strength of the film.
+    pub iridescence_texture: TextureSlot,
+    /// Green: thickness of the film.
+    pub iridescence_thickness_texture: TextureSlot,
+}
+}
+
+impl MaterialExtensions {
+    /// Every texture slot, used or not.
+    pub fn slots(&self) -> [&TextureSlot; 11] {
+        [
+            &self.specular_texture,
+            &self.specular_color_texture,
+            &self.transmission_texture,
+            &self.clearcoat_texture,
+            &self.clearcoat_roughness_texture,
+            &self.clearcoat_normal_texture,
+            &self.sheen_color_texture,
+            &self.sheen_roughness_texture,
+            &self.anisotropy_texture,
+            &self.iridescence_texture,
+            &self.iridescence_thickness_texture,
+        ]
+    }
+
+    /// Every factor, for checks; the flags among them read as a number next to zero.
+    pub fn factors(&self) -> &[f32] {
+        bytemuck::cast_slice(&bytemuck::bytes_of(self)[..std::mem::offset_of!(MaterialExtensions, specular_texture)])
+    }
 }
 
 /// [`Light::kind`]: an emissive triangle.
@@ -290,4 +448,52 @@ pub struct CameraView {
     /// Unused.
     pub padding_2: f32,
 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texture_slots_unpack_to_what_was_packed() {
+        let least = TextureRead {
+            array: 0,
+            layer: 0,
+            origin: [0, 0],
+            size: [1, 1],
+            uv_set: 0,
+            srgb: false,
+            linear_filter: false,
+            wrap: [0, 0],
+        };
+        let most = TextureRead {
+            array: 3,
+            layer: 255,
+            origin: [8184, 8184],
+            size: [8192, 8192],
+            uv_set: 1,
+            srgb: true,
+            linear_filter: true,
+            wrap: [2, 2],
+        };
+        // Each field alone at its most, so that no two share a bit.
+        let alone = [
+            TextureRead { array: most.array, ..least },
+            TextureRead { layer: most.layer, ..least },
+            TextureRead { origin: [most.origin[0], 0], ..least },
+            TextureRead { origin: [0, most.origin[1]], ..least },
+            TextureRead { size: [most.size[0], 1], ..least },
+            TextureRead { size: [1, most.size[1]], ..least },
+            TextureRead { uv_set: 1, ..least },
+            TextureRead { srgb: true, ..least },
+            TextureRead { linear_filter: true, ..least },
+            TextureRead { wrap: [2, 0], ..least },
+            TextureRead { wrap: [0, 2], ..least },
+        ];
+        for read in alone.into_iter().chain([least, most]) {
+            let slot = TextureSlot::new(Vec3::X, Vec3::Y, &read);
+            assert_eq!(slot.read(), Some(read));
+        }
+        assert_eq!(TextureSlot::NONE.read(), None);
+    }
 }

@@ -15,6 +15,7 @@ pub mod gltf;
 pub mod gpu_types;
 pub mod intersect;
 mod lights;
+mod material;
 pub mod octahedral;
 pub mod random;
 pub mod shapes;
@@ -22,6 +23,7 @@ pub mod sky;
 pub mod tangents;
 
 pub use flat::FlatScene;
+pub use material::{Anisotropy, Clearcoat, Iridescence, Sheen, Specular, Transmission, Volume};
 
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
@@ -111,7 +113,7 @@ pub enum AlphaMode {
     Mask(f32),
 }
 
-/// glTF 2.0 metallic-roughness material.
+/// glTF 2.0 metallic-roughness material with its extensions (`docs/materials.md`).
 #[derive(Debug, Clone)]
 pub struct Material {
     /// For reports.
@@ -138,6 +140,67 @@ pub struct Material {
     pub normal_texture: Option<TextureRef>,
     /// sRGB emission.
     pub emissive_texture: Option<TextureRef>,
+    /// KHR_materials_unlit: the base colour is shown as it is and nothing is reflected.
+    pub unlit: bool,
+    /// KHR_materials_ior: index of refraction of the dielectric, at least 1; or 0, which reflects everything at any angle.
+    pub ior: f32,
+    /// KHR_materials_dispersion: 20 over the Abbe number; 0 for none.
+    pub dispersion: f32,
+    /// KHR_materials_specular.
+    pub specular: Specular,
+    /// KHR_materials_transmission.
+    pub transmission: Transmission,
+    /// KHR_materials_volume; without it a transmissive surface is a thin wall.
+    pub volume: Option<Volume>,
+    /// KHR_materials_clearcoat.
+    pub clearcoat: Clearcoat,
+    /// KHR_materials_sheen.
+    pub sheen: Sheen,
+    /// KHR_materials_anisotropy.
+    pub anisotropy: Anisotropy,
+    /// KHR_materials_iridescence.
+    pub iridescence: Iridescence,
+}
+
+impl Material {
+    /// Whether rays pass through the surface into a medium below it. Such a surface has two sides, whatever
+    /// `double_sided` says.
+    pub fn bounds_a_medium(&self) -> bool {
+        self.volume.is_some() && self.transmission.factor > 0.0
+    }
+
+    /// Whether the back is a surface too.
+    pub fn is_two_sided(&self) -> bool {
+        self.double_sided || self.bounds_a_medium()
+    }
+
+    /// Every texture it reads.
+    pub fn textures(&self) -> impl Iterator<Item = TextureRef> {
+        [
+            self.base_color_texture,
+            self.metallic_roughness_texture,
+            self.normal_texture,
+            self.emissive_texture,
+            self.specular.texture,
+            self.specular.color_texture,
+            self.transmission.texture,
+            self.clearcoat.texture,
+            self.clearcoat.roughness_texture,
+            self.clearcoat.normal_texture,
+            self.sheen.color_texture,
+            self.sheen.roughness_texture,
+            self.anisotropy.texture,
+            self.iridescence.texture,
+            self.iridescence.thickness_texture,
+        ]
+        .into_iter()
+        .flatten()
+    }
+
+    /// The texture that a mesh's tangents are for: the first that lives in tangent space.
+    pub fn tangent_texture(&self) -> Option<TextureRef> {
+        self.normal_texture.or(self.clearcoat.normal_texture).or(self.anisotropy.texture)
+    }
 }
 
 impl Default for Material {
@@ -155,6 +218,16 @@ impl Default for Material {
             metallic_roughness_texture: None,
             normal_texture: None,
             emissive_texture: None,
+            unlit: false,
+            ior: 1.5,
+            dispersion: 0.0,
+            specular: Specular::default(),
+            transmission: Transmission::default(),
+            volume: None,
+            clearcoat: Clearcoat::default(),
+            sheen: Sheen::default(),
+            anisotropy: Anisotropy::default(),
+            iridescence: Iridescence::default(),
         }
     }
 }

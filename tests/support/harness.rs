@@ -47,10 +47,6 @@ pub mod functions {
     pub const OCTAHEDRAL: u32 = 2;
     pub const BASIS: u32 = 3;
     pub const WARPS: u32 = 4;
-    pub const BRDF: u32 = 5;
-    pub const BRDF_SAMPLE: u32 = 6;
-    pub const GGX_SAMPLE: u32 = 7;
-    pub const GGX_PDF: u32 = 8;
     pub const SRGB: u32 = 9;
     pub const TONE_MAP: u32 = 10;
     pub const MIS_WEIGHT: u32 = 11;
@@ -72,6 +68,7 @@ pub mod scene_functions {
     pub const CAMERA: u32 = 6;
     pub const SHADING_NORMAL: u32 = 8;
     pub const SHADOW_RAY: u32 = 9;
+    pub const FOOTPRINT: u32 = 20;
     pub const PYRAMID_SAMPLE: u32 = 10;
 }
 

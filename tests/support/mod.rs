@@ -1,9 +1,11 @@
 //! What the GPU tests share: one device a test binary, scenes in small pictures, and statistics.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+pub mod bsdf;
 pub mod gltf_writer;
 pub mod harness;
 pub mod plate;
+pub mod shader_copy;
 pub mod statistics;
 pub mod twins;
 

@@ -42,11 +42,6 @@ pub struct Brdf {
     pub alpha: f64,
 }
 
-/// Relative luminance of linear Rec. 709.
-pub fn luminance(c: DVec3) -> f64 {
-    0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z
-}
-
 impl Brdf {
     /// The BRDF itself, without the cosine, as the specification writes it: mix(dielectric_brdf, metal_brdf, metallic)
     /// with the height-correlated Smith visibility V = G / (4 NL NV).
@@ -60,31 +55,6 @@ impl Brdf {
         let f = 0.04 + 0.96 * fresnel;
         let dielectric = self.base_color / PI * (1.0 - f) + DVec3::splat(d * v * f);
         dielectric.lerp(metal, self.metallic)
-    }
-
-    /// Probability of the specular lobe, as `brdf.wgsl` chooses it.
-    pub fn specular_probability(&self, wo: DVec3) -> f64 {
-        let weight = (1.0 - wo.z).powi(5);
-        let f = 0.04 + 0.96 * weight;
-        let metal = self.base_color + (1.0 - self.base_color) * weight;
-        let specular = luminance(DVec3::splat(f).lerp(metal, self.metallic));
-        let diffuse = (1.0 - self.metallic) * luminance(self.base_color) * (1.0 - f);
-        if diffuse <= 0.0 { 1.0 } else { (specular / (specular + diffuse)).clamp(0.1, 0.9) }
-    }
-
-    /// Density of the direction sampled by visible normals: G1(wo) D(h) / (4 wo.z).
-    pub fn visible_normal_pdf(&self, wo: DVec3, wi: DVec3) -> f64 {
-        let h = (wo + wi).normalize();
-        let a2 = self.alpha * self.alpha;
-        let d = a2 / (PI * (h.z * h.z * (a2 - 1.0) + 1.0).powi(2));
-        let g1 = 2.0 * wo.z / (wo.z + (a2 + (1.0 - a2) * wo.z * wo.z).sqrt());
-        g1 * d / (4.0 * wo.z)
-    }
-
-    /// Density of the whole sampler.
-    pub fn pdf(&self, wo: DVec3, wi: DVec3) -> f64 {
-        let p = self.specular_probability(wo);
-        p * self.visible_normal_pdf(wo, wi) + (1.0 - p) * wi.z / PI
     }
 }
 

@@ -9,7 +9,7 @@ fn target_function(surface: Surface, sample: LightSample, previous: bool) -> f32
         return 0.0;
     }
     let light = light_contribution(sample, surface.position, previous);
-    return luminance(surface_evaluate(surface, light.direction) * light.value);
+    return luminance(surface_scatter(surface, light.direction, light.distance) * light.value);
 }
 
 // Resampling weight w = m p-hat / p of one candidate, with m = 1 / M for M candidates of one kind.
@@ -34,7 +34,7 @@ fn stream_contribution_weight(stream: Stream, target_value: f32) -> f32 {
 // f L G of a light sample, without the visibility V.
 fn unshadowed_contribution(surface: Surface, sample: LightSample) -> vec3f {
     let light = light_contribution(sample, surface.position, false);
-    return surface_evaluate(surface, light.direction) * light.value;
+    return surface_scatter(surface, light.direction, light.distance) * light.value;
 }
 
 // V between a surface and a light sample.
@@ -50,7 +50,7 @@ fn shade_reservoir(surface: Surface, reservoir: Reservoir) -> vec3f {
     }
     let sample = reservoir_sample(reservoir);
     let light = light_contribution(sample, surface.position, false);
-    let unshadowed = surface_evaluate(surface, light.direction) * light.value;
+    let unshadowed = surface_scatter(surface, light.direction, light.distance) * light.value;
     if luminance(unshadowed) <= 0.0 || !is_visible(surface, light.direction, light.distance) {
         return vec3f(0.0);
     }

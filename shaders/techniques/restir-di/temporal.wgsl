@@ -23,7 +23,7 @@ fn reproject(surface: Surface) -> vec2i {
 
 fn is_same_surface(surface: Surface, previous: Surface) -> bool {
     let distance = length(surface.position - frame.camera.position);
-    let albedo_difference = abs(surface.brdf.base_color - previous.brdf.base_color);
+    let albedo_difference = abs(surface.bsdf.base_color - previous.bsdf.base_color);
     return length(surface.position - previous.position) <= params.temporal_position_threshold * distance
         && dot(surface.basis.normal, previous.basis.normal) >= params.temporal_normal_threshold
         && max(albedo_difference.r, max(albedo_difference.g, albedo_difference.b)) <= params.temporal_albedo_threshold;
@@ -71,9 +71,7 @@ fn reuse_pixel(pixel: vec2u) {
         keep(pixel);
         return;
     }
-    let uv = bitcast<vec2f>(seen.zw);
-    let previous = load_surface(seen.x, seen.y, uv,
-        direction_to_camera(frame.previous_camera, triangle_point(seen.x, seen.y, uv)));
+    let previous = load_seen(frame.previous_camera, seen.x, seen.y, bitcast<vec2f>(seen.zw));
     if !is_same_surface(surface, previous) {
         keep(pixel);
         return;

@@ -2,7 +2,7 @@
 
 use crate::failure::Result;
 use crate::{report, scene};
-use restir::scene::flat::SceneStats;
+use restir::scene::flat::{SceneStats, TextureStats};
 
 /// Show what a scene holds: triangles, lights, bytes, the BVH, warnings.
 #[derive(clap::Args)]
@@ -57,7 +57,43 @@ fn table(info: &Info) -> String {
         format!("cameras    {}", info.cameras.join(", ")),
         format!("bounds     {low:?} to {high:?} m"),
         format!("bvh        {} nodes, depth {}, cost {:.1}", stats.bvh_nodes, stats.bvh_depth, stats.bvh_cost),
-        format!("memory     {:.1} MiB on the GPU", stats.gpu_bytes as f64 / f64::from(1 << 20)),
+        format!("memory     {:.1} MiB on the GPU", mebibytes(stats.gpu_bytes)),
     ]
+    .into_iter()
+    .chain(textures(&stats.texture_arrays))
+    .collect::<Vec<_>>()
     .join("\n")
+}
+
+/// A line for all texture arrays, and one for each.
+fn textures(arrays: &[TextureStats]) -> Vec<String> {
+    if arrays.is_empty() {
+        return Vec::new();
+    }
+    let of = |count: fn(&TextureStats) -> u64| arrays.iter().map(count).sum::<u64>();
+    let (images, bytes, used) = (of(|a| a.images), of(|a| a.bytes), of(|a| a.used_bytes));
+    let empty = |bytes: u64, used: u64| 100.0 * (bytes - used.min(bytes)) as f64 / bytes.max(1) as f64;
+    let total = format!(
+        "images     {images} in {} arrays: {:.1} MiB of that, {:.1} % of it empty",
+        arrays.len(),
+        mebibytes(bytes),
+        empty(bytes, used)
+    );
+    let each = arrays.iter().map(|a| {
+        format!(
+            "  array    {} x {} x {} layers, {} levels: {} images, {:.1} MiB, {:.1} % empty",
+            a.width,
+            a.height,
+            a.layers,
+            a.levels,
+            a.images,
+            mebibytes(a.bytes),
+            empty(a.bytes, a.used_bytes)
+        )
+    });
+    std::iter::once(total).chain(each).collect()
+}
+
+fn mebibytes(bytes: u64) -> f64 {
+    bytes as f64 / f64::from(1 << 20)
 }

@@ -1,8 +1,8 @@
 //! Rows of spheres from smooth to rough and from plastic to metal, on a checkered floor under three panels and a dim
 //! sky.
 
-use super::{matte, place};
-use crate::scene::{Camera, Environment, Material, Mesh, Scene, shapes};
+use super::{CELL, CELLS, checkers, matte, place};
+use crate::scene::{Camera, Environment, Material, Scene, shapes};
 use glam::{Mat4, Vec3};
 
 const ROUGHNESS: [f32; 7] = [0.05, 0.12, 0.22, 0.35, 0.5, 0.7, 1.0];
@@ -10,9 +10,6 @@ const METALLIC: [f32; 3] = [1.0, 0.5, 0.0];
 const COLOR: Vec3 = Vec3::new(0.9, 0.52, 0.22);
 const RADIUS: f32 = 0.5;
 const SPACING: f32 = 1.25;
-/// Cells along a side of the floor, and the side of one in metres.
-const CELLS: i32 = 32;
-const CELL: f32 = 0.625;
 const PANEL: f32 = 1.6;
 const PANEL_RADIANCE: f32 = 12.0;
 
@@ -57,16 +54,4 @@ pub(super) fn glossy_spheres() -> Scene {
         }
     }
     scene
-}
-
-/// Every other cell of the floor.
-fn checkers(parity: i32, material: u32) -> Mesh {
-    let mut mesh = Mesh { material, ..Mesh::default() };
-    for i in 0..CELLS {
-        for k in (0..CELLS).filter(|k| (i + k) % 2 == parity) {
-            let corner = Vec3::new((i - CELLS / 2) as f32, 0.0, (k - CELLS / 2) as f32) * CELL;
-            shapes::append(&mut mesh, &shapes::parallelogram(corner, Vec3::Z * CELL, Vec3::X * CELL, material));
-        }
-    }
-    mesh
 }

@@ -5,9 +5,10 @@ mod cornell;
 mod furnace;
 mod glossy_spheres;
 mod many_lights;
+mod materials;
 mod veach_mis;
 
-use super::{Instance, Material, Mesh, Scene};
+use super::{Instance, Material, Mesh, Scene, shapes};
 use crate::error::{Error, Result};
 use glam::{Mat4, Vec3};
 
@@ -70,6 +71,12 @@ pub const ALL: &[BuiltinInfo] = &[
         example: "glossy-spheres",
     },
     BuiltinInfo {
+        name: "materials",
+        title: "Materials",
+        doc: "A row of spheres for each lobe: anisotropy, iridescence, sheen, clearcoat, thin walls, glass, index of refraction.",
+        example: "materials",
+    },
+    BuiltinInfo {
         name: "area-lights",
         title: "Area lights",
         doc: "A few things on a floor under a sphere, a rectangle and a disk of light.",
@@ -95,6 +102,7 @@ pub fn make(name: &str) -> Result<Scene> {
         }
         "area-lights" => Ok(area_lights::area_lights()),
         "glossy-spheres" => Ok(glossy_spheres::glossy_spheres()),
+        "materials" => Ok(materials::materials()),
         _ => Err(Error::Unknown {
             kind: "built-in scene",
             name: name.to_owned(),
@@ -114,6 +122,10 @@ pub fn describe_json() -> serde_json::Value {
         .collect()
 }
 
+/// Cells along a side of a checkered floor, and the side of one in metres.
+const CELLS: i32 = 32;
+const CELL: f32 = 0.625;
+
 /// A rough dielectric.
 fn matte(name: &str, color: Vec3) -> Material {
     Material { name: name.to_owned(), base_color: color.extend(1.0), metallic: 0.0, ..Material::default() }
@@ -123,6 +135,18 @@ fn matte(name: &str, color: Vec3) -> Material {
 fn place(scene: &mut Scene, mesh: Mesh, transform: Mat4) {
     scene.instances.push(Instance { mesh: scene.meshes.len() as u32, transform });
     scene.meshes.push(mesh);
+}
+
+/// Every other cell of a checkered floor.
+fn checkers(parity: i32, material: u32) -> Mesh {
+    let mut mesh = Mesh { material, ..Mesh::default() };
+    for i in 0..CELLS {
+        for k in (0..CELLS).filter(|k| (i + k) % 2 == parity) {
+            let corner = Vec3::new((i - CELLS / 2) as f32, 0.0, (k - CELLS / 2) as f32) * CELL;
+            shapes::append(&mut mesh, &shapes::parallelogram(corner, Vec3::Z * CELL, Vec3::X * CELL, material));
+        }
+    }
+    mesh
 }
 
 /// A bright saturated colour round the colour wheel (one turn is 1), its mean about 1/2 whatever the hue.

@@ -1,9 +1,10 @@
 //! A flat scene as one run of bytes and back: how a Worker hands it to the page.
 //!
 //! `RSTR`, version, length of the header (u32 each), 0; the header as JSON; then the arrays in the order of [`Sections`],
-//! each beginning at a multiple of 16. Little-endian throughout.
+//! the texture arrays and the environment, each
+//! beginning at a multiple of 16. Little-endian throughout.
 
-use super::{Atlas, FlatEnvironment, FlatScene, SceneStats, validate};
+use super::{FlatEnvironment, FlatScene, SceneStats, TextureArray, validate};
 use crate::error::{Error, Result};
 use crate::scene::{Camera, LightMotion, Projection};
 use bytemuck::Pod;
@@ -13,7 +14,7 @@ use serde::{Deserialize, Serialize};
 const _: () = assert!(cfg!(target_endian = "little"), "arrays are copied as they lie in memory");
 
 const MAGIC: [u8; 4] = *b"RSTR";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const PREFIX: usize = 16;
 const ALIGNMENT: usize = 16;
 
@@ -27,8 +28,7 @@ struct Header {
     bounds: [[f32; 3]; 2],
     stats: SceneStats,
     warnings: Vec<String>,
-    atlas_size: u32,
-    atlas_layers: u32,
+    textures: Vec<TextureRecord>,
     environment: Option<[u32; 2]>,
     sections: Sections,
 }
@@ -42,9 +42,18 @@ struct Sections {
     meshes: usize,
     instances: usize,
     materials: usize,
+    material_extensions: usize,
     lights: usize,
-    atlas_texels: usize,
     environment_texels: usize,
+}
+
+#[derive(Serialize, Deserialize)]
+struct TextureRecord {
+    width: u32,
+    height: u32,
+    layers: u32,
+    levels: u32,
+    bytes: usize,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -87,8 +96,11 @@ impl FlatScene {
         section(bytemuck::cast_slice(&self.meshes));
         section(bytemuck::cast_slice(&self.instances));
         section(bytemuck::cast_slice(&self.materials));
+        section(bytemuck::cast_slice(&self.material_extensions));
         section(bytemuck::cast_slice(&self.lights));
-        section(&self.atlas.texels);
+        for array in &self.textures {
+            section(&array.texels);
+        }
         if let Some(environment) = &self.environment {
             section(bytemuck::cast_slice(&environment.radiance));
             section(bytemuck::cast_slice(&environment.alias));
@@ -124,8 +136,8 @@ impl FlatScene {
             meshes,
             instances,
             materials,
+            material_extensions,
             lights,
-            atlas_texels,
             environment_texels,
         } = header.sections;
         let scene = FlatScene {
@@ -136,14 +148,11 @@ impl FlatScene {
             meshes: reader.array(meshes, "meshes")?,
             instances: reader.array(instances, "instances")?,
             materials: reader.array(materials, "materials")?,
+            material_extensions: reader.array(material_extensions, "material extensions")?,
             lights: reader.array(lights, "lights")?,
             first_punctual: header.first_punctual,
             motions: header.motions.into_iter().map(MotionRecord::into_motion).collect(),
-            atlas: Atlas {
-                size: header.atlas_size,
-                layers: header.atlas_layers,
-                texels: reader.array(atlas_texels, "atlas")?,
-            },
+            textures: header.textures.into_iter().map(|array| array.read(&mut reader)).collect::<Result<_>>()?,
             environment: match header.environment {
                 Some([width, height]) => Some(FlatEnvironment {
                     width,
@@ -226,8 +235,7 @@ fn header_of(scene: &FlatScene) -> Header {
         bounds: scene.bounds.map(|corner| corner.to_array()),
         stats: scene.stats.clone(),
         warnings: scene.warnings.clone(),
-        atlas_size: scene.atlas.size,
-        atlas_layers: scene.atlas.layers,
+        textures: scene.textures.iter().map(TextureRecord::of).collect(),
         environment: scene.environment.as_ref().map(|e| [e.width, e.height]),
         sections: Sections {
             nodes: scene.nodes.len(),
@@ -236,10 +244,22 @@ fn header_of(scene: &FlatScene) -> Header {
             meshes: scene.meshes.len(),
             instances: scene.instances.len(),
             materials: scene.materials.len(),
+            material_extensions: scene.material_extensions.len(),
             lights: scene.lights.len(),
-            atlas_texels: scene.atlas.texels.len(),
             environment_texels: scene.environment.as_ref().map_or(0, |e| e.radiance.len()),
         },
+    }
+}
+
+impl TextureRecord {
+    fn of(array: &TextureArray) -> Self {
+        let TextureArray { width, height, layers, levels, ref texels } = *array;
+        TextureRecord { width, height, layers, levels, bytes: texels.len() }
+    }
+
+    fn read(self, reader: &mut Reader) -> Result<TextureArray> {
+        let TextureRecord { width, height, layers, levels, bytes } = self;
+        Ok(TextureArray { width, height, layers, levels, texels: reader.array(bytes, "textures")? })
     }
 }
 

@@ -1,33 +1,27 @@
 //! Materials with their texture slots.
 
-use super::atlas::Rectangle;
+use super::mips::Texels;
+use super::textures::Place;
 use crate::error::{Error, Result};
-use crate::scene::gpu_types::{Material, TextureSlot};
+use crate::scene::gpu_types::{Material, TextureRead, TextureSlot};
 use crate::scene::{self, AlphaMode, Scene, TextureRef, Wrap};
 use glam::Vec3;
 
-const UV_SET_1: u32 = 1;
-const SRGB: u32 = 2;
-const LINEAR_FILTER: u32 = 4;
-const WRAP_U_SHIFT: u32 = 4;
-const WRAP_V_SHIFT: u32 = 6;
+/// Tells where the image of a texture lies, or nothing if there is no such texture.
+pub(super) type Find<'a> = &'a mut dyn FnMut(usize, Texels) -> Option<Place>;
 
 /// Flattens the materials; a scene without any gets one default material.
-pub(super) fn flatten(scene: &Scene, rectangles: &[Rectangle]) -> Result<Vec<Material>> {
+pub(super) fn flatten(scene: &Scene, find: Find) -> Result<Vec<Material>> {
     let fallback = [scene::Material::default()];
     let materials = if scene.materials.is_empty() { &fallback[..] } else { &scene.materials };
     let all = materials.iter().enumerate().map(|(i, material)| {
-        flatten_one(material, scene, rectangles)
+        flatten_one(material, scene, find)
             .map_err(|what| Error::bad_value(format!("material {i} '{}'", material.name), what))
     });
     all.collect()
 }
 
-fn flatten_one(
-    material: &scene::Material,
-    scene: &Scene,
-    rectangles: &[Rectangle],
-) -> std::result::Result<Material, String> {
+fn flatten_one(material: &scene::Material, scene: &Scene, find: Find) -> std::result::Result<Material, String> {
     let cutoff = match material.alpha {
         AlphaMode::Opaque => 0.0,
         AlphaMode::Mask(cutoff) => cutoff,
@@ -39,44 +33,54 @@ fn flatten_one(
     if material.emissive.min_element() < 0.0 {
         return Err("negative emission".into());
     }
-    let slot = |texture, srgb| slot(texture, srgb, scene, rectangles);
+    let base_color = match material.alpha {
+        AlphaMode::Opaque => Texels::Color,
+        AlphaMode::Mask(_) => Texels::MaskedColor,
+    };
+    let mut slot = |texture, texels| slot(texture, texels, scene, find);
     Ok(Material {
         base_color: material.base_color,
-        emissive: material.emissive,
+        // An unlit surface shines, but is no light.
+        emissive: if material.unlit { Vec3::ZERO } else { material.emissive },
         metallic: material.metallic,
         roughness: material.roughness,
         normal_scale: material.normal_scale,
         alpha_cutoff: cutoff,
-        double_sided: u32::from(material.double_sided),
-        base_color_texture: slot(material.base_color_texture, SRGB)?,
-        metallic_roughness_texture: slot(material.metallic_roughness_texture, 0)?,
-        normal_texture: slot(material.normal_texture, 0)?,
-        emissive_texture: slot(material.emissive_texture, SRGB)?,
+        double_sided: u32::from(material.is_two_sided()),
+        base_color_texture: slot(material.base_color_texture, base_color)?,
+        metallic_roughness_texture: slot(material.metallic_roughness_texture, Texels::Data)?,
+        normal_texture: slot(material.normal_texture, Texels::Normal)?,
+        emissive_texture: slot(material.emissive_texture, Texels::Color)?,
     })
 }
 
-fn slot(
+pub(super) fn slot(
     reference: Option<TextureRef>,
-    srgb: u32,
+    texels: Texels,
     scene: &Scene,
-    rectangles: &[Rectangle],
+    find: Find,
 ) -> std::result::Result<TextureSlot, String> {
-    let Some(reference) = reference else { return Ok(bytemuck::Zeroable::zeroed()) };
+    let Some(reference) = reference else { return Ok(TextureSlot::NONE) };
     let index = reference.texture as usize;
-    let (Some(texture), Some(place)) = (scene.textures.get(index), rectangles.get(index)) else {
+    let (Some(texture), Some(place)) = (scene.textures.get(index), find(index, texels)) else {
         return Err(format!("there is no texture {index}"));
     };
     let [row_u, row_v] = uv_rows(&reference);
     if !row_u.is_finite() || !row_v.is_finite() {
         return Err("a texture transform is not finite".into());
     }
-    let flags = if reference.uv_set == 1 { UV_SET_1 } else { 0 }
-        | srgb
-        | if texture.linear_filter { LINEAR_FILTER } else { 0 }
-        | wrap_bits(texture.wrap[0]) << WRAP_U_SHIFT
-        | wrap_bits(texture.wrap[1]) << WRAP_V_SHIFT;
-    let Rectangle { layer, x, y, width, height } = *place;
-    Ok(TextureSlot { row_u, flags, row_v, layer, x, y, width, height })
+    let Place { spot, width, height } = place;
+    let read = TextureRead {
+        array: spot.array,
+        layer: spot.layer,
+        origin: [spot.x, spot.y],
+        size: [width, height],
+        uv_set: reference.uv_set,
+        srgb: matches!(texels, Texels::Color | Texels::MaskedColor),
+        linear_filter: texture.linear_filter,
+        wrap: texture.wrap.map(wrap_bits),
+    };
+    Ok(TextureSlot::new(row_u, row_v, &read))
 }
 
 fn wrap_bits(wrap: Wrap) -> u32 {
@@ -97,6 +101,7 @@ pub(super) fn uv_rows(reference: &TextureRef) -> [Vec3; 2] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::packing::Spot;
     use super::*;
     use glam::{Vec2, Vec4};
     use std::f32::consts::FRAC_PI_2;
@@ -119,7 +124,11 @@ mod tests {
         Scene { materials: vec![material], textures: vec![texture], ..Scene::default() }
     }
 
-    const PLACE: Rectangle = Rectangle { layer: 3, x: 1, y: 2, width: 2, height: 1 };
+    fn find(texture: usize, texels: Texels) -> Option<Place> {
+        assert_eq!(texels, Texels::Color);
+        let spot = Spot { array: 1, layer: 3, x: 8, y: 16 };
+        (texture == 0).then_some(Place { spot, width: 2, height: 1 })
+    }
 
     #[test]
     fn transform_follows_the_extension() {
@@ -131,28 +140,37 @@ mod tests {
 
     #[test]
     fn slot_says_how_to_read() {
-        let materials = flatten(&scene(), &[PLACE]).unwrap();
+        let materials = flatten(&scene(), &mut find).unwrap();
         let slot = materials[0].base_color_texture;
-        assert_eq!(slot.flags, UV_SET_1 | SRGB | LINEAR_FILTER | 1 << WRAP_U_SHIFT | 2 << WRAP_V_SHIFT);
-        assert_eq!((slot.layer, slot.x, slot.y, slot.width, slot.height), (3, 1, 2, 2, 1));
-        assert_eq!(materials[0].normal_texture.width, 0);
+        let expected = TextureRead {
+            array: 1,
+            layer: 3,
+            origin: [8, 16],
+            size: [2, 1],
+            uv_set: 1,
+            srgb: true,
+            linear_filter: true,
+            wrap: [1, 2],
+        };
+        assert_eq!(slot.read(), Some(expected));
+        assert_eq!(materials[0].normal_texture.read(), None);
     }
 
     #[test]
     fn bad_materials_are_errors() {
-        assert!(flatten(&scene(), &[]).is_err());
+        assert!(flatten(&scene(), &mut |_, _| None).is_err());
         let mut bad = scene();
         bad.materials[0].emissive.x = f32::INFINITY;
-        assert!(flatten(&bad, &[PLACE]).is_err());
+        assert!(flatten(&bad, &mut find).is_err());
         bad.materials[0].emissive.x = -1.0;
-        assert!(flatten(&bad, &[PLACE]).is_err());
+        assert!(flatten(&bad, &mut find).is_err());
         let mut bad = scene();
         bad.materials[0].base_color = Vec4::NAN;
-        assert!(flatten(&bad, &[PLACE]).is_err());
+        assert!(flatten(&bad, &mut find).is_err());
     }
 
     #[test]
     fn no_materials_means_the_default_one() {
-        assert_eq!(flatten(&Scene::default(), &[]).unwrap().len(), 1);
+        assert_eq!(flatten(&Scene::default(), &mut find).unwrap().len(), 1);
     }
 }

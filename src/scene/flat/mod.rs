@@ -1,33 +1,79 @@
 //! A scene as plain arrays with a BVH: what is uploaded, sent from a Worker to the page, and kept to rebuild a lost device.
 
-mod atlas;
 mod bytes;
 mod emission;
 pub(crate) mod environment;
+mod extensions;
 mod framing;
 pub(crate) mod levels;
 mod lights;
 mod materials;
+mod mips;
+mod packing;
+mod textures;
 mod triangles;
 mod validate;
 
 pub use environment::FlatEnvironment;
 pub(super) use triangles::face_normal;
 
-use super::gpu_types::{BvhNode, Light, Material, NONE, Triangle, TriangleAttributes};
+use super::gpu_types::{BvhNode, Light, Material, MaterialExtensions, NONE, Triangle, TriangleAttributes};
 use super::{Camera, LightMotion, MAX_COORDINATE, Projection, PunctualKind, Scene, bvh};
 use crate::error::{Error, Result};
 use glam::{Mat4, Vec3};
 
-/// All textures of a scene in layers of one size. Texels are as stored in the files (sRGB where the file says so).
+/// Images of about one size, each with its mip chain, in layers of one size. Texels are as stored in the files (sRGB where
+/// the file says so).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Atlas {
-    /// Width and height of a layer in texels.
-    pub size: u32,
+pub struct TextureArray {
+    /// Width of a layer in texels.
+    pub width: u32,
+    /// Height of a layer in texels.
+    pub height: u32,
     /// Number of layers, at least 1.
     pub layers: u32,
-    /// RGBA8, layer by layer, row by row: `size * size * layers * 4` bytes.
+    /// Number of levels, at least 1; level k has `max(1, side >> k)` texels along a side.
+    pub levels: u32,
+    /// RGBA8, level by level, layer by layer, row by row.
     pub texels: Vec<u8>,
+}
+
+impl TextureArray {
+    /// Bytes of one layer of a level.
+    pub fn layer_bytes(&self, level: u32) -> u64 {
+        u64::from(mips::side(self.width, level)) * u64::from(mips::side(self.height, level)) * 4
+    }
+
+    /// Bytes of all levels, as the sizes say.
+    fn expected_bytes(&self) -> u64 {
+        (0..self.levels).map(|level| self.layer_bytes(level) * u64::from(self.layers)).sum()
+    }
+
+    /// Where in `texels` a texel begins.
+    pub fn offset(&self, level: u32, layer: u32, x: u32, y: u32) -> usize {
+        let before: u64 = (0..level).map(|level| self.layer_bytes(level) * u64::from(self.layers)).sum();
+        let row = u64::from(y) * u64::from(mips::side(self.width, level)) + u64::from(x);
+        (before + u64::from(layer) * self.layer_bytes(level) + 4 * row) as usize
+    }
+}
+
+/// What one texture array holds, for reports.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct TextureStats {
+    /// Width of a layer in texels.
+    pub width: u32,
+    /// Height of a layer in texels.
+    pub height: u32,
+    /// Layers.
+    pub layers: u32,
+    /// Mip levels.
+    pub levels: u32,
+    /// Images.
+    pub images: u64,
+    /// Bytes of all levels of all layers.
+    pub bytes: u64,
+    /// Those of them that are texels of images.
+    pub used_bytes: u64,
 }
 
 /// What a scene holds, for reports.
@@ -45,6 +91,8 @@ pub struct SceneStats {
     pub materials: u64,
     /// Textures.
     pub textures: u64,
+    /// The arrays that their images lie in.
+    pub texture_arrays: Vec<TextureStats>,
     /// Lights: emissive triangles + punctual lights + sun + environment.
     pub lights: u64,
     /// Emissive triangles among them.
@@ -109,14 +157,16 @@ pub struct FlatScene {
     pub instances: Vec<FlatInstance>,
     /// At least one.
     pub materials: Vec<Material>,
+    /// What glTF's extensions add to each material; empty where no material uses one.
+    pub material_extensions: Vec<MaterialExtensions>,
     /// With alias table; the sun and the environment, if any, are the last. May be empty.
     pub lights: Vec<Light>,
     /// Index in `lights` of the first punctual light; they follow in the order of [`Scene::lights`].
     pub first_punctual: u32,
     /// How punctual lights move; `light` counts from `first_punctual`.
     pub motions: Vec<LightMotion>,
-    /// Textures.
-    pub atlas: Atlas,
+    /// The images that materials read; at most four arrays, none in a scene without textures.
+    pub textures: Vec<TextureArray>,
     /// Light from infinitely far away.
     pub environment: Option<FlatEnvironment>,
     /// The file's cameras, or one that frames the scene: at least one.
@@ -143,9 +193,16 @@ impl FlatScene {
             warnings.push(format!("{dropped} triangles without area or with unusable positions were left out"));
         }
 
-        progress(0.8, "packing textures");
-        let (atlas, rectangles) = atlas::pack(scene, &mut warnings)?;
-        let materials = materials::flatten(scene, &rectangles)?;
+        // Once to learn which images there are and what they mean, once to say where they went.
+        let mut images = textures::Images::new(scene)?;
+        let mut ask = |texture, texels| images.ask(texture, texels).map(|_| textures::Place::default());
+        materials::flatten(scene, &mut ask)?;
+        extensions::flatten(scene, &mut ask)?;
+        let mut report = |fraction| progress(0.8 + 0.1 * fraction, "making mip levels");
+        let (textures, places) = images.pack(&mut warnings, &mut report)?;
+        let mut find = |texture, texels| images.ask(texture, texels).and_then(|image| places.get(image).copied());
+        let materials = materials::flatten(scene, &mut find)?;
+        let material_extensions = extensions::flatten(scene, &mut find)?;
 
         progress(0.9, "weighing lights");
         let environment = match &scene.environment {
@@ -175,10 +232,11 @@ impl FlatScene {
             meshes,
             instances,
             materials,
+            material_extensions,
             lights,
             first_punctual,
             motions: scene.motions.clone(),
-            atlas,
+            textures,
             environment,
             warnings: Vec::new(),
         };
@@ -191,6 +249,7 @@ impl FlatScene {
             instances: scene.instances.len() as u64,
             materials: flat.materials.len() as u64,
             textures: scene.textures.len() as u64,
+            texture_arrays: textures::stats(&flat.textures, &places),
             lights: flat.lights.len() as u64,
             emissive_triangles: u64::from(first_punctual),
             bvh_nodes: flat.nodes.len() as u64,
@@ -230,8 +289,10 @@ impl FlatScene {
             + size_of_val(&self.attributes[..])
             + size_of::<super::gpu_types::Instance>() * self.instances.len()
             + size_of_val(&self.materials[..])
+            + size_of_val(&self.material_extensions[..])
             + size_of_val(&self.lights[..]);
-        (arrays + self.atlas.texels.len() + environment) as u64
+        let textures: usize = self.textures.iter().map(|array| array.texels.len()).sum();
+        (arrays + textures + environment) as u64
     }
 }
 

@@ -25,7 +25,7 @@ impl Soup {
     pub fn add(&mut self, scene: &Scene, mesh: &Mesh, transform: Mat4) {
         let flags = scene.materials.get(mesh.material as usize).map_or(0, |material| {
             let masked = matches!(material.alpha, AlphaMode::Mask(_));
-            u32::from(material.double_sided) * TRIANGLE_DOUBLE_SIDED + u32::from(masked) * TRIANGLE_ALPHA_MASK
+            u32::from(material.is_two_sided()) * TRIANGLE_DOUBLE_SIDED + u32::from(masked) * TRIANGLE_ALPHA_MASK
         }) | (mesh.shape as u32) << SHAPE_SHIFT;
         let placed = Placed::new(mesh, transform, flags);
         for corners in mesh.indices.as_chunks::<3>().0 {

@@ -1,9 +1,12 @@
 //! Whether a flat scene that came from outside may be rendered: shaders check no index.
 
-use super::{Atlas, FlatEnvironment, FlatScene};
+use super::mips::{level_count, side};
+use super::packing::{MAX_ARRAYS, MAX_LAYERS, MAX_SIDE};
+use super::{FlatEnvironment, FlatScene, TextureArray};
 use crate::scene::bvh::{MAX_DEPTH, MAX_TOP_DEPTH};
 use crate::scene::gpu_types::{
-    LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, Material, NONE, TextureSlot, Triangle, TriangleAttributes,
+    LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, Material, MaterialExtensions, NONE, TextureSlot, Triangle,
+    TriangleAttributes,
 };
 use std::ops::Range;
 
@@ -15,7 +18,11 @@ pub(super) fn validate(scene: &FlatScene) -> Result<(), Fault> {
     forest(scene)?;
     each("triangles", &scene.triangles, |_, triangle| check_triangle(scene, triangle))?;
     each("attributes", &scene.attributes, |_, attributes| check_attributes(attributes))?;
-    each("materials", &scene.materials, |_, material| check_material(&scene.atlas, material))?;
+    each("materials", &scene.materials, |_, material| check_material(&scene.textures, material))?;
+    let extensions = &scene.material_extensions;
+    let complete = extensions.is_empty() || extensions.len() == scene.materials.len();
+    must(complete, "not one a material").map_err(|what| fault("material extensions", what))?;
+    each("material extensions", extensions, |_, extensions| check_extensions(&scene.textures, extensions))?;
     each("lights", &scene.lights, |i, light| check_light(scene, i, light))?;
     emitters(scene)?;
     let punctual = (scene.lights.len() as u64).checked_sub(u64::from(scene.first_punctual));
@@ -24,7 +31,8 @@ pub(super) fn validate(scene: &FlatScene) -> Result<(), Fault> {
         let finite = motion.center.is_finite() && motion.axis.is_finite() && motion.angular_speed.is_finite();
         must(u64::from(motion.light) < punctual && finite, "no such light, or numbers that are not finite")
     })?;
-    check_atlas(&scene.atlas).map_err(|what| fault("atlas", what))?;
+    must(scene.textures.len() <= MAX_ARRAYS, "too many").map_err(|what| fault("textures", what))?;
+    each("textures", &scene.textures, |_, array| check_texture_array(array))?;
     if let Some(environment) = &scene.environment {
         check_environment(environment).map_err(|what| fault("environment", what))?;
     }
@@ -158,7 +166,7 @@ fn emitters(scene: &FlatScene) -> Result<(), Fault> {
         .map_err(|what| fault("first_punctual", what))
 }
 
-fn check_material(atlas: &Atlas, material: &Material) -> Result<(), &'static str> {
+fn check_material(textures: &[TextureArray], material: &Material) -> Result<(), &'static str> {
     must(material.base_color.is_finite() && material.emissive.is_finite(), "a colour that is not finite")?;
     let factors = [material.metallic, material.roughness, material.normal_scale, material.alpha_cutoff];
     must(factors.iter().all(|f| f.is_finite()), "a factor that is not finite")?;
@@ -168,17 +176,30 @@ fn check_material(atlas: &Atlas, material: &Material) -> Result<(), &'static str
         &material.normal_texture,
         &material.emissive_texture,
     ];
-    let inside = |start: u32, length: u32| start.checked_add(length).is_some_and(|end| end <= atlas.size);
-    let sound = |slot: &TextureSlot| {
-        slot.width == 0
-            || (slot.height > 0
-                && slot.row_u.is_finite()
-                && slot.row_v.is_finite()
-                && slot.layer < atlas.layers
-                && inside(slot.x, slot.width)
-                && inside(slot.y, slot.height))
+    check_slots(textures, &slots)
+}
+
+fn check_extensions(textures: &[TextureArray], extensions: &MaterialExtensions) -> Result<(), &'static str> {
+    must(extensions.factors().iter().all(|f| f.is_finite()), "a factor that is not finite")?;
+    check_slots(textures, &extensions.slots())
+}
+
+fn check_slots(textures: &[TextureArray], slots: &[&TextureSlot]) -> Result<(), &'static str> {
+    must(slots.iter().all(|slot| is_sound(textures, slot)), "a texture outside its array")
+}
+
+/// Whether every level that a slot reads lies in its array.
+fn is_sound(textures: &[TextureArray], slot: &TextureSlot) -> bool {
+    let Some(read) = slot.read() else { return true };
+    let ([x, y], [width, height]) = (read.origin, read.size);
+    let levels = level_count(width, height);
+    let inside = |start: u32, length: u32, whole: u32, k: u32| (start >> k) + side(length, k) <= side(whole, k);
+    let holds = |array: &TextureArray| {
+        read.layer < array.layers
+            && levels <= array.levels
+            && (0..levels).all(|k| inside(x, width, array.width, k) && inside(y, height, array.height, k))
     };
-    must(slots.into_iter().all(sound), "a texture outside the atlas")
+    slot.row_u.is_finite() && slot.row_v.is_finite() && textures.get(read.array as usize).is_some_and(holds)
 }
 
 fn check_light(scene: &FlatScene, index: usize, light: &Light) -> Result<(), &'static str> {
@@ -202,10 +223,11 @@ fn check_light(scene: &FlatScene, index: usize, light: &Light) -> Result<(), &'s
     }
 }
 
-fn check_atlas(atlas: &Atlas) -> Result<(), &'static str> {
-    must((1..=8192).contains(&atlas.size) && (1..=256).contains(&atlas.layers), "absurd size")?;
-    let bytes = u64::from(atlas.size).pow(2) * u64::from(atlas.layers) * 4;
-    must(bytes == atlas.texels.len() as u64, "wrong number of texels")
+fn check_texture_array(array: &TextureArray) -> Result<(), &'static str> {
+    let TextureArray { width, height, layers, levels, .. } = *array;
+    must((1..=MAX_SIDE).contains(&width) && (1..=MAX_SIDE).contains(&height), "absurd size")?;
+    must((1..=MAX_LAYERS).contains(&layers) && (1..=level_count(width, height)).contains(&levels), "absurd size")?;
+    must(array.expected_bytes() == array.texels.len() as u64, "wrong number of texels")
 }
 
 fn check_environment(environment: &FlatEnvironment) -> Result<(), &'static str> {

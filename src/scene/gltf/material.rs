@@ -3,7 +3,7 @@
 use super::buffers::Buffers;
 use super::container::Document;
 use super::images::Images;
-use super::{Resolve, tidy};
+use super::{Resolve, material_extensions, tidy};
 use crate::error::Result;
 use crate::scene::{AlphaMode, Material, Scene, Texture, TextureRef, Wrap};
 use glam::{Vec2, Vec3, Vec4};
@@ -31,8 +31,8 @@ pub(super) fn load(document: &Document, buffers: &Buffers, resolve: Resolve, sce
 }
 
 /// What materials share while they are loaded.
-struct Loader<'a> {
-    document: &'a Document<'a>,
+pub(super) struct Loader<'a> {
+    pub(super) document: &'a Document<'a>,
     buffers: &'a Buffers<'a>,
     resolve: Resolve<'a>,
     images: Images,
@@ -72,7 +72,7 @@ impl Loader<'_> {
         };
         let scale = source.normal_texture.as_ref().map_or(1.0, |info| info.scale);
         let [normal_scale] = document.finite([scale], &format!("{place}.normalTexture.scale"))?;
-        Ok(Material {
+        let mut material = Material {
             name: source.name.as_deref().map_or_else(|| place.to_owned(), tidy),
             base_color: Vec4::from(base_color),
             metallic,
@@ -86,7 +86,26 @@ impl Loader<'_> {
                 .texture(&pbr.metallic_roughness_texture, &format!("{pbr_place}.metallicRoughnessTexture"))?,
             normal_texture,
             emissive_texture: self.texture(&source.emissive_texture, &format!("{place}.emissiveTexture"))?,
-        })
+            ..Material::default()
+        };
+        material_extensions::load(self, source, place, &mut material)?;
+        Ok(material)
+    }
+
+    /// Says what was odd.
+    pub(super) fn warn(&mut self, warning: String) {
+        self.warnings.push(warning);
+    }
+
+    /// The same as [`Loader::texture`] from the parts of an untyped textureInfo.
+    pub(super) fn texture_of(
+        &mut self,
+        index: usize,
+        tex_coord: u32,
+        transform: Option<TextureTransform>,
+        place: &str,
+    ) -> Result<Option<TextureRef>> {
+        self.texture_ref(TextureInfo { index, tex_coord, transform }, place)
     }
 
     /// Factors clamped to [0, 1].

@@ -39,8 +39,8 @@ pub(super) fn load(
     for (position, source) in mesh.primitives.iter().enumerate() {
         let place = format!("meshes[{index}].primitives[{position}]");
         let material = material_index(document, source, &place, scene)?;
-        let normal_texture = scene.materials.get(material as usize).and_then(|material| material.normal_texture);
-        let reader = Reader { document, buffers, source, place: &place, normal_texture };
+        let tangents_for = tangents_for(scene.materials.get(material as usize));
+        let reader = Reader { document, buffers, source, place: &place, tangents_for };
         if let Some(mesh) = reader.read(budget, &mut scene.warnings)? {
             warn_of_missing_uvs(&mesh, scene.materials.get(material as usize), &place, &mut scene.warnings);
             loaded.push(scene.meshes.len() as u32);
@@ -66,12 +66,19 @@ fn material_index(document: &Document, source: &Primitive, place: &str, scene: &
 /// Says which textures will be read at (0, 0).
 fn warn_of_missing_uvs(mesh: &Mesh, material: Option<&Material>, place: &str, warnings: &mut Vec<String>) {
     let Some(m) = material else { return };
-    let textures = [m.base_color_texture, m.metallic_roughness_texture, m.normal_texture, m.emissive_texture];
     for (set, uvs) in mesh.uvs.iter().enumerate() {
-        if uvs.is_empty() && textures.iter().flatten().any(|texture| texture.uv_set as usize == set) {
+        if uvs.is_empty() && m.textures().any(|texture| texture.uv_set as usize == set) {
             warnings.push(format!("{place}: its material reads TEXCOORD_{set}, which it lacks: (0, 0) is used"));
         }
     }
+}
+
+/// The texture whose space a mesh's tangents follow, if the material looks at tangents at all: its own, or that of UV set
+/// 0 for an anisotropy without textures.
+fn tangents_for(material: Option<&Material>) -> Option<TextureRef> {
+    let material = material?;
+    let plain = TextureRef { texture: 0, uv_set: 0, offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE };
+    material.tangent_texture().or((material.anisotropy.strength > 0.0).then_some(plain))
 }
 
 /// One primitive and what it takes to read it.
@@ -80,8 +87,8 @@ struct Reader<'a> {
     buffers: &'a Buffers<'a>,
     source: &'a Primitive,
     place: &'a str,
-    /// The normal map that tangents would be for.
-    normal_texture: Option<TextureRef>,
+    /// What tangents would be for.
+    tangents_for: Option<TextureRef>,
 }
 
 impl Reader<'_> {
@@ -102,7 +109,7 @@ impl Reader<'_> {
 
         let Some(corners) = self.triangles(budget, positions.count, warnings)? else { return Ok(None) };
         // Flat normals need a vertex for each corner (specification, section 3.7.2.1), as generated tangents may.
-        let made_tangents = self.normal_texture.is_some() && (tangents.is_none() || normals.is_none());
+        let made_tangents = self.tangents_for.is_some() && (tangents.is_none() || normals.is_none());
         let vertices =
             if normals.is_none() || made_tangents { corners.len() } else { corners.len().min(positions.count) };
         budget.charge(self.document, vertices as u64 * VERTEX_BYTES)?;
@@ -128,7 +135,7 @@ impl Reader<'_> {
         if repaired > 0 {
             warnings.push(format!("{}: {repaired} attribute(s) were not usable numbers and were replaced", self.place));
         }
-        if let Some(texture) = self.normal_texture {
+        if let Some(texture) = self.tangents_for {
             let given = tangents.filter(|_| normals.is_some()).and_then(|given| given_tangents(&given, &sources));
             match given {
                 Some(given) => mesh.tangents = given,

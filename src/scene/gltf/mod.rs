@@ -15,6 +15,7 @@ mod container;
 mod images;
 mod lights;
 mod material;
+mod material_extensions;
 mod mesh;
 mod nodes;
 mod topology;
@@ -25,8 +26,21 @@ use crate::error::Result;
 use container::Document;
 
 /// Extensions that a file may require.
-pub const SUPPORTED_EXTENSIONS: &[&str] =
-    &["KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_texture_transform"];
+pub const SUPPORTED_EXTENSIONS: &[&str] = &[
+    "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_dispersion",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_volume",
+    "KHR_texture_transform",
+];
 
 /// Most placements of meshes a scene may have.
 pub const MAX_INSTANCES: u64 = 4_000_000;
