@@ -13,13 +13,15 @@ export const dist = join(root, 'dist');
 
 const work = join(root, 'target', 'web');
 const wasmPackage = join(work, 'pkg');
+/** The second module, of what only some files need, lies beside the first: there the page's types look for it. */
+const decoderPackage = wasmPackage;
 const staging = join(work, 'dist');
 const stamp = join(work, 'stamp');
 
-/** wasm and its JavaScript glue, brotli, in KB of 1000 bytes. */
-const sizeLimit = 450;
+/** wasm and its JavaScript glue, brotli, in KB of 1000 bytes: of the page, and of the decoders that it fetches on demand. */
+const sizeLimits = { page: 450, decoders: 250 };
 
-const inputs = ['Cargo.toml', 'Cargo.lock', 'build.rs', 'src', 'shaders', 'www', 'scripts', 'package-lock.json', 'tsconfig.json'];
+const inputs = ['Cargo.toml', 'Cargo.lock', 'build.rs', 'src', 'decoders', 'shaders', 'www', 'scripts', 'package-lock.json', 'tsconfig.json'];
 
 function filesOf(path) {
   if (!existsSync(path)) return [];
@@ -39,15 +41,20 @@ function inputHash() {
 
 const isCurrent = (hash) => existsSync(dist) && existsSync(stamp) && readFileSync(stamp, 'utf8') === hash;
 
-async function buildWasm() {
-  const options = ['--profile', 'web', '--target', 'web', '--mode', 'no-install', '--no-pack', '--out-name', 'restir', '--out-dir', wasmPackage];
-  await run(['wasm-pack', 'build', ...options]);
-  const bytes = ['restir_bg.wasm', 'restir.js'].map((name) => brotliCompressSync(readFileSync(join(wasmPackage, name))).length);
+/** Builds the module `name` of the crate in `folder` into `out`; fails where it is larger than `limit`. */
+async function buildModule(folder, name, out, limit, features = []) {
+  const options = ['--profile', 'web', '--target', 'web', '--mode', 'no-install', '--no-pack', '--out-name', name, '--out-dir', out];
+  await run(['wasm-pack', 'build', folder, ...options, ...features]);
+  const bytes = [`${name}_bg.wasm`, `${name}.js`].map((file) => brotliCompressSync(readFileSync(join(out, file))).length);
   const [wasm, glue] = bytes.map((length) => length / 1000);
-  const text = `wasm ${wasm.toFixed(0)} KB + glue ${glue.toFixed(0)} KB brotli, limit ${sizeLimit} KB`;
-  if (wasm + glue > sizeLimit) throw new StepError(`too large: ${text}`);
+  const text = `wasm ${wasm.toFixed(0)} KB + glue ${glue.toFixed(0)} KB brotli, limit ${limit} KB`;
+  if (wasm + glue > limit) throw new StepError(`too large: ${text}`);
   return text;
 }
+
+const buildWasm = () => buildModule(root, 'restir', wasmPackage, sizeLimits.page);
+const buildDecoders = () =>
+  buildModule(join(root, 'decoders'), 'decoders', decoderPackage, sizeLimits.decoders, ['--', '--features', 'module']);
 
 async function buildPage() {
   rmSync(staging, { recursive: true, force: true });
@@ -56,7 +63,9 @@ async function buildPage() {
   for (const name of readdirSync(join(root, 'www')).filter((file) => !file.endsWith('.ts'))) {
     cpSync(join(root, 'www', name), join(staging, name), { recursive: true });
   }
-  for (const name of ['restir.js', 'restir_bg.wasm']) cpSync(join(wasmPackage, name), join(staging, 'pkg', name));
+  for (const [folder, name] of [[wasmPackage, 'restir'], [decoderPackage, 'decoders']]) {
+    for (const file of [`${name}.js`, `${name}_bg.wasm`]) cpSync(join(folder, file), join(staging, 'pkg', file));
+  }
   // The old page stays whole until the new one is.
   rmSync(dist, { recursive: true, force: true });
   renameSync(staging, dist);
@@ -71,6 +80,7 @@ export async function build() {
   }
   rmSync(stamp, { force: true });
   await step('build: wasm', buildWasm);
+  await step('build: decoders', buildDecoders);
   await step('build: page', buildPage);
   writeFileSync(stamp, hash);
 }

@@ -6,6 +6,7 @@ use crate::gpu::Gpu;
 use crate::gpu::data_texture::DataTexture;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
+use crate::pace::{Pace, SLICE_BYTES};
 use crate::scene::flat::{FlatEnvironment, FlatInstance, TextureArray, levels};
 use crate::scene::gpu_types::{
     BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, MATERIAL_UNLIT, MATERIAL_VOLUME,
@@ -54,7 +55,16 @@ impl GpuScene {
     ///
     /// # Errors
     /// `LIMIT`, with numbers, where the device is too small for it.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn new(gpu: &Gpu, scene: &FlatScene) -> Result<Self> {
+        pollster::block_on(Self::upload(gpu, scene, &mut Pace::unbroken()))
+    }
+
+    /// Uploads a scene, in slices.
+    ///
+    /// # Errors
+    /// As [`GpuScene::new`].
+    pub async fn upload(gpu: &Gpu, scene: &FlatScene, pace: &mut Pace) -> Result<Self> {
         let limits = gpu.device.limits();
         let texture_limit = |what: &str, wanted: u32, had: u32, unit: &'static str| {
             if wanted > had {
@@ -82,12 +92,17 @@ impl GpuScene {
         let first = scene.first_punctual as usize;
         let punctual: Vec<Light> = scene.lights.iter().skip(first).filter(|l| !is_distant(l)).copied().collect();
         Ok(GpuScene {
-            nodes: gpu.storage_of("nodes", &scene.nodes)?,
+            nodes: gpu.storage_in_slices("nodes", &scene.nodes, pace).await?,
             triangles: [
-                gpu.storage_of("triangles", first_triangles)?,
-                gpu.storage_of("the triangles after the first 2796202", if rest.is_empty() { &point } else { rest })?,
+                gpu.storage_in_slices("triangles", first_triangles, pace).await?,
+                gpu.storage_in_slices(
+                    "the triangles after the first 2796202",
+                    if rest.is_empty() { &point } else { rest },
+                    pace,
+                )
+                .await?,
             ],
-            attributes: DataTexture::new(gpu, "attributes", &scene.attributes)?,
+            attributes: DataTexture::in_slices(gpu, "attributes", &scene.attributes, pace).await?,
             materials: DataTexture::new(gpu, "materials", &scene.materials)?,
             material_extensions: DataTexture::new(gpu, "material extensions", &scene.material_extensions)?,
             instances: DataTexture::new(gpu, "instances", &instance_records(scene, &transforms, &transforms))?,
@@ -96,23 +111,32 @@ impl GpuScene {
             lights: if scene.lights.is_empty() {
                 gpu.storage("lights", std::mem::size_of::<Light>() as u64)?
             } else {
-                gpu.storage_of("lights", &scene.lights)?
+                gpu.storage_in_slices("lights", &scene.lights, pace).await?
             },
-            textures: std::array::from_fn(|i| texture_array(gpu, TEXTURE_ARRAYS[i], scene.textures.get(i))),
+            textures: [
+                texture_array(gpu, TEXTURE_ARRAYS[0], scene.textures.first(), pace).await,
+                texture_array(gpu, TEXTURE_ARRAYS[1], scene.textures.get(1), pace).await,
+                texture_array(gpu, TEXTURE_ARRAYS[2], scene.textures.get(2), pace).await,
+                texture_array(gpu, TEXTURE_ARRAYS[3], scene.textures.get(3), pace).await,
+            ],
             environment_radiance: upload(
                 gpu,
                 "environment radiance",
                 size,
                 wgpu::TextureFormat::Rgba32Float,
                 bytemuck::cast_slice(radiance),
-            ),
+                pace,
+            )
+            .await,
             environment_alias: upload(
                 gpu,
                 "environment alias table",
                 size,
                 wgpu::TextureFormat::Rgba32Uint,
                 bytemuck::cast_slice(alias),
-            ),
+                pace,
+            )
+            .await,
             no_pyramid: gpu.texture("no pyramid", UVec2::ONE, wgpu::TextureFormat::Rgba32Float),
             pyramid: None,
             rest_positions: punctual.iter().map(|l| l.position).collect(),
@@ -155,8 +179,8 @@ impl GpuScene {
 
     /// Replaces the environment's radiance and alias table by those of a map of the same size.
     pub(crate) fn update_environment(&self, gpu: &Gpu, environment: &FlatEnvironment) {
-        write(gpu, self.environment_radiance.texture(), 0, 0, bytemuck::cast_slice(&environment.radiance));
-        write(gpu, self.environment_alias.texture(), 0, 0, bytemuck::cast_slice(&environment.alias));
+        write_rows(gpu, self.environment_radiance.texture(), [0; 3], bytemuck::cast_slice(&environment.radiance));
+        write_rows(gpu, self.environment_alias.texture(), [0; 3], bytemuck::cast_slice(&environment.alias));
     }
 
     /// What has to be made before the scene can be rendered.
@@ -290,7 +314,7 @@ fn distant_light(scene: &FlatScene, kind: u32) -> u32 {
 }
 
 /// An array with all its levels; one white texel for an array that the scene does not have.
-fn texture_array(gpu: &Gpu, label: &str, array: Option<&TextureArray>) -> wgpu::TextureView {
+async fn texture_array(gpu: &Gpu, label: &str, array: Option<&TextureArray>, pace: &mut Pace) -> wgpu::TextureView {
     let format = wgpu::TextureFormat::Rgba8Unorm;
     let texture = match array {
         Some(array) => {
@@ -299,14 +323,14 @@ fn texture_array(gpu: &Gpu, label: &str, array: Option<&TextureArray>) -> wgpu::
                 for layer in 0..array.layers {
                     let start = array.offset(level, layer, 0, 0);
                     let end = start + array.layer_bytes(level) as usize;
-                    write(gpu, &texture, level, layer, array.texels.get(start..end).unwrap_or_default());
+                    write(gpu, &texture, level, layer, array.texels.get(start..end).unwrap_or_default(), pace).await;
                 }
             }
             texture
         }
         None => {
             let texture = create(gpu, label, [1; 3], 1, format);
-            write(gpu, &texture, 0, 0, &[u8::MAX; 4]);
+            write(gpu, &texture, 0, 0, &[u8::MAX; 4], pace).await;
             texture
         }
     };
@@ -316,9 +340,16 @@ fn texture_array(gpu: &Gpu, label: &str, array: Option<&TextureArray>) -> wgpu::
     })
 }
 
-fn upload(gpu: &Gpu, label: &str, size: [u32; 2], format: wgpu::TextureFormat, texels: &[u8]) -> wgpu::TextureView {
+async fn upload(
+    gpu: &Gpu,
+    label: &str,
+    size: [u32; 2],
+    format: wgpu::TextureFormat,
+    texels: &[u8],
+    pace: &mut Pace,
+) -> wgpu::TextureView {
     let texture = create(gpu, label, [size[0], size[1], 1], 1, format);
-    write(gpu, &texture, 0, 0, texels);
+    write(gpu, &texture, 0, 0, texels, pace).await;
     texture.create_view(&Default::default())
 }
 
@@ -336,20 +367,34 @@ fn create(gpu: &Gpu, label: &str, size: [u32; 3], levels: u32, format: wgpu::Tex
     })
 }
 
-/// Writes one layer of one level, so that no staging copy is larger than that.
-fn write(gpu: &Gpu, texture: &wgpu::Texture, level: u32, layer: u32, texels: &[u8]) {
-    let (width, height) = ((texture.width() >> level).max(1), (texture.height() >> level).max(1));
-    let row = width * texture.format().block_copy_size(None).unwrap_or(4);
+/// Writes one layer of one level, a few rows at once, so that no staging copy is large.
+async fn write(gpu: &Gpu, texture: &wgpu::Texture, level: u32, layer: u32, texels: &[u8], pace: &mut Pace) {
+    let row = row_bytes(texture, level) as usize;
+    let rows = (SLICE_BYTES / row).max(1);
+    for (part, y) in texels.chunks(row * rows).zip((0..).step_by(rows)) {
+        write_rows(gpu, texture, [level, layer, y], part);
+        pace.breathe().await;
+    }
+}
+
+fn row_bytes(texture: &wgpu::Texture, level: u32) -> u32 {
+    (texture.width() >> level).max(1) * texture.format().block_copy_size(None).unwrap_or(4)
+}
+
+/// Writes whole rows from row `y` of a layer of a level on.
+fn write_rows(gpu: &Gpu, texture: &wgpu::Texture, [level, layer, y]: [u32; 3], texels: &[u8]) {
+    let row = row_bytes(texture, level);
+    let height = texels.len() as u32 / row;
     gpu.queue.write_texture(
         wgpu::TexelCopyTextureInfo {
             texture,
             mip_level: level,
-            origin: wgpu::Origin3d { x: 0, y: 0, z: layer },
+            origin: wgpu::Origin3d { x: 0, y, z: layer },
             aspect: wgpu::TextureAspect::All,
         },
         texels,
         wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: Some(height) },
-        wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        wgpu::Extent3d { width: (texture.width() >> level).max(1), height, depth_or_array_layers: 1 },
     );
 }
 

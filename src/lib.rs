@@ -12,6 +12,7 @@ pub mod gpu;
 pub mod gpu_scene;
 pub mod lab;
 pub mod output;
+pub mod pace;
 pub mod params;
 pub mod renderer;
 pub mod scene;

@@ -8,6 +8,7 @@ use crate::gpu::recorder::{PassTime, Recorder, Timer};
 use crate::gpu::shader::table;
 use crate::gpu_scene::{GpuScene, environment_light, sun_light};
 use crate::output::Image;
+use crate::pace::Pace;
 use crate::params::{FilmParams, Params, RenderParams};
 use crate::scene::flat::environment;
 use crate::scene::{Camera, Environment, FlatScene};
@@ -88,8 +89,17 @@ impl Renderer {
     ///
     /// # Errors
     /// `LIMIT`, with numbers, where the device is too small.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn new(gpu: Gpu, scene: FlatScene, size: UVec2) -> Result<Self> {
-        let gpu_scene = GpuScene::new(&gpu, &scene)?;
+        pollster::block_on(Self::prepare(gpu, scene, size, &mut Pace::unbroken()))
+    }
+
+    /// As [`Renderer::new`], in slices; on the web there is only this.
+    ///
+    /// # Errors
+    /// `LIMIT`, with numbers, where the device is too small.
+    pub async fn prepare(gpu: Gpu, scene: FlatScene, size: UVec2, pace: &mut Pace) -> Result<Self> {
+        let gpu_scene = GpuScene::upload(&gpu, &scene, pace).await?;
         let film = Film::new(&gpu, size)?;
         let camera = scene.cameras.first().cloned().ok_or_else(|| Error::bad_value("scene", "has no camera"))?;
         let technique = (techniques::ALL[0].create)(&gpu);
@@ -170,9 +180,18 @@ impl Renderer {
     ///
     /// # Errors
     /// As [`Renderer::new`].
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn set_scene(&mut self, scene: FlatScene) -> Result<()> {
+        pollster::block_on(self.change_scene(scene, &mut Pace::unbroken()))
+    }
+
+    /// As [`Renderer::set_scene`], in slices; on the web there is only this.
+    ///
+    /// # Errors
+    /// As [`Renderer::set_scene`].
+    pub async fn change_scene(&mut self, scene: FlatScene, pace: &mut Pace) -> Result<()> {
         let camera = scene.cameras.first().cloned().ok_or_else(|| Error::bad_value("scene", "has no camera"))?;
-        let gpu_scene = GpuScene::new(&self.gpu, &scene)?;
+        let gpu_scene = GpuScene::upload(&self.gpu, &scene, pace).await?;
         self.gpu.check()?;
         self.gpu_scene = gpu_scene;
         self.alias_is_stale = false;

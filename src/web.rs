@@ -3,12 +3,16 @@
 
 use crate::film::blit::Blit;
 use crate::gpu::{Gpu, GpuOptions, instance};
+use crate::pace::Pace;
+use crate::scene::flat::cooked;
+use crate::scene::gltf::{Decoders, DracoMesh, Fault, Limits, Picture};
 use crate::scene::{Camera, Projection, builtin, environment, gltf};
 use crate::{Error, FlatScene, Renderer, Scene};
 use glam::{UVec2, Vec3};
+use std::pin::Pin;
 use wasm_bindgen::prelude::*;
 
-type JsResult<T> = std::result::Result<T, JsValue>;
+type JsResult<T> = Result<T, JsValue>;
 
 /// Runs once when the module is loaded: a panic becomes a console error with a stack.
 #[wasm_bindgen(start)]
@@ -83,12 +87,83 @@ pub fn flatten_builtin(
     flatten(builtin::make(name).js()?, lights, seed, (environment, map), progress)
 }
 
+/// What can be chosen in a glTF file, and whether it needs decoders, as JSON ([`gltf::Contents`]). For a Worker.
+#[wasm_bindgen]
+pub fn contents_of(name: &str, bytes: &[u8]) -> JsResult<String> {
+    Ok(serde_json::json!(gltf::contents(name, bytes).js()?).to_string())
+}
+
+/// The `FlatScene` bytes in a cooked file, checked in full. For a Worker.
+#[wasm_bindgen]
+pub fn uncook(name: &str, bytes: &[u8]) -> JsResult<Vec<u8>> {
+    cooked::from_file(name, bytes).js()?;
+    Ok(cooked::contents(name, bytes).js()?.to_vec())
+}
+
+#[wasm_bindgen]
+extern "C" {
+    /// How a file is read: which scene and variant of it, what decodes it, what was odd before it came here.
+    pub type FileOptions;
+    #[wasm_bindgen(method, getter)]
+    fn scene(this: &FileOptions) -> Option<u32>;
+    #[wasm_bindgen(method, getter)]
+    fn variant(this: &FileOptions) -> Option<String>;
+    #[wasm_bindgen(method, getter)]
+    fn decoders(this: &FileOptions) -> Option<DecoderModule>;
+    #[wasm_bindgen(method, getter)]
+    fn warnings(this: &FileOptions) -> Vec<String>;
+
+    /// The module that `restir-decoders` is on the page, once the Worker has fetched it.
+    pub type DecoderModule;
+    #[wasm_bindgen(method, catch)]
+    fn decode_draco(this: &DecoderModule, bytes: &[u8], max_bytes: f64) -> JsResult<Vec<u8>>;
+    #[wasm_bindgen(method, catch)]
+    fn decode_meshopt(
+        this: &DecoderModule,
+        bytes: &[u8],
+        mode: &str,
+        filter: &str,
+        count: u32,
+        stride: u32,
+    ) -> JsResult<Vec<u8>>;
+    #[wasm_bindgen(method, catch)]
+    fn decode_picture(this: &DecoderModule, bytes: &[u8], max_side: u32, max_bytes: f64) -> JsResult<Vec<u8>>;
+}
+
+/// What the module threw, as its own error.
+fn fault(thrown: &JsValue) -> Fault {
+    let property = |key: &str| js_sys::Reflect::get(thrown, &key.into()).ok().and_then(|value| value.as_string());
+    // A trap is a string, or an error without a code.
+    let message = property("message").or_else(|| thrown.as_string()).unwrap_or_else(|| "the decoder failed".into());
+    match property("code").as_deref() {
+        Some("UNSUPPORTED") => Fault::Unsupported(message),
+        _ => Fault::Broken(message),
+    }
+}
+
+impl Decoders for DecoderModule {
+    fn draco(&self, bytes: &[u8], max_bytes: u64) -> Result<DracoMesh, Fault> {
+        let mesh = self.decode_draco(bytes, max_bytes as f64).map_err(|thrown| fault(&thrown))?;
+        DracoMesh::from_bytes(&mesh).ok_or_else(|| Fault::Broken("the decoder gave no mesh".into()))
+    }
+
+    fn meshopt(&self, bytes: &[u8], mode: &str, filter: &str, count: u32, stride: u32) -> Result<Vec<u8>, Fault> {
+        self.decode_meshopt(bytes, mode, filter, count, stride).map_err(|thrown| fault(&thrown))
+    }
+
+    fn picture(&self, bytes: &[u8], limits: Limits) -> Result<Picture, Fault> {
+        let picture = self.decode_picture(bytes, limits.side, limits.bytes as f64).map_err(|thrown| fault(&thrown))?;
+        Picture::from_bytes(picture).ok_or_else(|| Fault::Broken("the decoder gave no picture".into()))
+    }
+}
+
 /// A glTF file as `FlatScene` bytes; `resolve(uri)` gives the bytes of a file beside it, or undefined. For a Worker.
 #[wasm_bindgen]
 pub fn flatten_file(
     name: &str,
     bytes: &[u8],
     resolve: &js_sys::Function,
+    options: &FileOptions,
     lights: u32,
     seed: u32,
     environment: Option<String>,
@@ -105,7 +180,43 @@ pub fn flatten_file(
                 Error::bad_file(name, uri, "refers to a file that was not given; choose all its files at once")
             })
     };
-    flatten(gltf::load_bytes(name, bytes, &mut find).js()?, lights, seed, (environment, map), progress)
+    let (variant, decoders) = (options.variant(), options.decoders());
+    let choice = gltf::Options {
+        scene: options.scene().map(|scene| scene as usize),
+        variant: variant.as_deref(),
+        decoders: decoders.as_ref().map(|decoders| decoders as &dyn Decoders),
+    };
+    let mut scene = gltf::load_bytes_with(name, bytes, &choice, &mut find).js()?;
+    scene.warnings.splice(0..0, options.warnings());
+    flatten(scene, lights, seed, (environment, map), progress)
+}
+
+#[wasm_bindgen]
+extern "C" {
+    #[wasm_bindgen(js_name = setTimeout)]
+    fn set_timeout(work: &js_sys::Function, milliseconds: i32) -> JsValue;
+}
+
+/// Lets the page draw and listen between slices of work.
+fn pace() -> Pace {
+    let rest = || {
+        let promise = js_sys::Promise::new(&mut |resolve, _| {
+            set_timeout(&resolve, 0);
+        });
+        let waited = wasm_bindgen_futures::JsFuture::from(promise);
+        Box::pin(async move {
+            let _ = waited.await;
+        }) as Pin<Box<dyn Future<Output = ()>>>
+    };
+    Pace::sliced(js_sys::Date::now, rest)
+}
+
+/// A flattened scene from the Worker, copied in slices.
+async fn receive(bytes: &js_sys::Uint8Array, pace: &mut Pace) -> JsResult<FlatScene> {
+    let read = |offset: usize, part: &mut [u8]| {
+        bytes.subarray(offset as u32, (offset + part.len()) as u32).copy_to(part);
+    };
+    FlatScene::receive(bytes.length() as usize, read, pace).await.js()
 }
 
 /// A renderer that presents to a canvas.
@@ -120,23 +231,27 @@ impl Viewer {
     /// A viewer of a flattened scene at `width` x `height` pixels.
     pub async fn create(
         canvas: web_sys::HtmlCanvasElement,
-        flat_scene: &[u8],
+        flat_scene: js_sys::Uint8Array,
         width: u32,
         height: u32,
     ) -> JsResult<Viewer> {
-        let scene = FlatScene::from_bytes(flat_scene).js()?;
+        let mut pace = pace();
+        let scene = receive(&flat_scene, &mut pace).await?;
         let instance = instance();
         let surface = instance
             .create_surface(wgpu::SurfaceTarget::Canvas(canvas))
             .map_err(|e| js_error(&Error::NoAdapter(e.to_string())))?;
         let gpu = Gpu::from_instance(&instance, Some(&surface), &GpuOptions::default()).await.js()?;
         let blit = Blit::new(&gpu, surface);
-        Ok(Viewer { renderer: Renderer::new(gpu, scene, UVec2::new(width, height)).js()?, blit })
+        let renderer = Renderer::prepare(gpu, scene, UVec2::new(width, height), &mut pace).await.js()?;
+        Ok(Viewer { renderer, blit })
     }
 
     /// Replaces the scene by another flattened one.
-    pub fn load(&mut self, flat_scene: &[u8]) -> JsResult<()> {
-        self.renderer.set_scene(FlatScene::from_bytes(flat_scene).js()?).js()
+    pub async fn load(&mut self, flat_scene: js_sys::Uint8Array) -> JsResult<()> {
+        let mut pace = pace();
+        let scene = receive(&flat_scene, &mut pace).await?;
+        self.renderer.change_scene(scene, &mut pace).await.js()
     }
 
     /// Switches to another technique.

@@ -379,10 +379,10 @@ fn files_are_found_beside_the_scene() {
     std::fs::create_dir_all(&folder).unwrap();
     let (file, buffer) = triangle().gltf("a%20b.bin");
     std::fs::write(folder.join("scene.gltf"), file).unwrap();
-    let missing = gltf::load_file(&folder.join("scene.gltf")).unwrap_err();
+    let missing = gltf::load_file(&folder.join("scene.gltf"), &gltf::Options::default()).unwrap_err();
     std::fs::write(folder.join("a b.bin"), buffer).unwrap();
-    let found = gltf::load_file(&folder.join("scene.gltf"));
-    let folder_itself = gltf::load_file(&folder).unwrap_err();
+    let found = gltf::load_file(&folder.join("scene.gltf"), &gltf::Options::default());
+    let folder_itself = gltf::load_file(&folder, &gltf::Options::default()).unwrap_err();
     std::fs::remove_dir_all(&folder).unwrap();
     assert_eq!(missing.code(), "IO");
     let message = missing.to_string();
@@ -797,7 +797,7 @@ fn mutated_files_do_no_harm() {
 #[test]
 fn sponza() {
     let Some(path) = support::shared_file("sponza", "assets/bench/sponza.glb") else { return };
-    let scene = gltf::load_file(&path).unwrap();
+    let scene = gltf::load_file(&path, &gltf::Options::default()).unwrap();
     let triangles = |mesh: u32| scene.meshes[mesh as usize].indices.len() / 3;
     let total: usize = scene.instances.iter().map(|instance| triangles(instance.mesh)).sum();
     assert_eq!(total, 190_279);

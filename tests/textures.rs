@@ -376,7 +376,7 @@ fn devices_that_are_too_small_say_the_number() {
 #[test]
 fn sponza_wastes_nothing() {
     let Some(path) = support::shared_file("sponza_wastes_nothing", "assets/bench/sponza.glb") else { return };
-    let scene = restir::scene::gltf::load_file(&path).expect("a sound file");
+    let scene = restir::scene::gltf::load_file(&path, &Default::default()).expect("a sound file");
     let stats = flatten(&scene).stats.texture_arrays;
     let bytes: u64 = stats.iter().map(|array| array.bytes).sum();
     let used: u64 = stats.iter().map(|array| array.used_bytes).sum();

@@ -9,7 +9,7 @@ import { toFailure } from './messages.js';
 import { byId, clearError, showError, showProgress, showStatus, showWarnings } from './notices.js';
 import { type Group, fillMenu, isDefault, showPanel } from './panel.js';
 import init, { Viewer, describe } from './pkg/restir.js';
-import type { SceneSource, Surroundings } from './protocol.js';
+import type { Choice, Contents, Loaded, SceneSource, Surroundings } from './protocol.js';
 import { RenderLoop } from './render-loop.js';
 import { Resolution } from './resolution.js';
 import { readQuery, writeQuery } from './url-state.js';
@@ -92,31 +92,42 @@ class App {
 
   // Scenes
 
-  private flatten(source: SceneSource, surroundings: Surroundings | undefined): Promise<Uint8Array> {
+  private flatten(source: SceneSource, surroundings: Surroundings | undefined): Promise<Loaded> {
     const { lights, seed } = this.state;
     return this.loader.load(this.compiled, { source, surroundings, lights, seed }, showProgress);
   }
 
-  /** Shows a scene, or says why not and keeps the former one. Resolves to what went wrong, if anything did. */
-  private async open(source: SceneSource, surroundings: Surroundings | undefined, flat = this.flatten(source, surroundings)): Promise<unknown> {
+  /**
+   * Shows a scene, or says why not and keeps the former one. With `keepView` the camera stays where it is. Resolves to what
+   * went wrong, if anything did.
+   */
+  private async open(
+    source: SceneSource,
+    surroundings: Surroundings | undefined,
+    loading = this.flatten(source, surroundings),
+    keepView = source === this.source,
+  ): Promise<unknown> {
     let problem: unknown;
     try {
-      const bytes = await flat;
-      showProgress(1, 'Starting the renderer');
-      if (this.viewer) await this.loop.change((viewer) => this.replaceScene(viewer, bytes, source !== this.source));
-      else await this.createViewer(bytes);
-      this.flat = bytes;
+      const { flat, contents } = await loading;
+      showProgress(1, 'Starting the renderer', { cancellable: false });
+      if (this.viewer) await this.loop.change((viewer) => this.replaceScene(viewer, flat, keepView));
+      else await this.createViewer(flat);
+      this.flat = flat;
       this.source = source;
       this.surroundings = surroundings;
       this.state.environment = surroundings?.bytes ? undefined : surroundings?.name;
       this.state.scene = source.kind === 'builtin' ? source.name : undefined;
       clearError();
+      this.showContents(source, contents);
       this.writeUrl();
     } catch (error) {
       problem = error;
-      showError(error);
+      // A load that made way for another leaves the bar to that.
+      if (toFailure(error).code === 'CANCELLED' && this.loader.busy) return problem;
+      if (toFailure(error).code !== 'CANCELLED') showError(error);
     }
-    this.showSceneMenu(source);
+    this.showSceneMenu(this.source);
     this.showEnvironmentMenu();
     showProgress(undefined);
     return problem;
@@ -131,9 +142,18 @@ class App {
     }
   }
 
-  private replaceScene(viewer: Viewer, flat: Uint8Array, isOther: boolean): void {
-    viewer.load(flat);
-    if (isOther) {
+  /** Loads the same file again with another choice. */
+  private async choose(choice: Choice): Promise<void> {
+    const { source, surroundings } = this;
+    if (source.kind !== 'file') return;
+    const chosen = { ...source, choice: { ...source.choice, ...choice } };
+    await this.open(chosen, surroundings, this.flatten(chosen, surroundings), choice.scene === undefined);
+  }
+
+  private async replaceScene(viewer: Viewer, flat: Uint8Array, keepView: boolean): Promise<void> {
+    await viewer.load(flat);
+    if (keepView) this.state.pose = this.orbit.toCamera();
+    else {
       this.state.camera = '0';
       this.state.pose = undefined;
     }
@@ -275,12 +295,24 @@ class App {
     fillMenu(menu('environment'), environments, this.surroundings?.name ?? '');
   }
 
+  /** Menus for what can be chosen in the file shown; hidden where there is no choice. */
+  private showContents(source: SceneSource, { scenes, scene, variants }: Contents = { scenes: [], scene: 0, variants: [] }): void {
+    const choice = source.kind === 'file' ? source.choice : {};
+    byId('file-scene-row', HTMLElement).hidden = scenes.length < 2;
+    byId('variant-row', HTMLElement).hidden = variants.length === 0;
+    fillMenu(menu('file-scene'), scenes.map((name, index) => [String(index), name]), String(choice.scene ?? scene));
+    fillMenu(menu('variant'), [['', 'default'], ...variants.map((name): [string, string] => [name, name])], choice.variant ?? '');
+  }
+
   private listen(): void {
+    button('cancel').addEventListener('click', () => this.loader.cancel());
+    menu('file-scene').addEventListener('change', () => void this.choose({ scene: Number(menu('file-scene').value) }));
+    menu('variant').addEventListener('change', () => void this.choose({ variant: menu('variant').value || undefined }));
+    menu('scene').addEventListener('change', () => void this.open({ kind: 'builtin', name: menu('scene').value }, this.surroundings));
     menu('environment').addEventListener('change', () => {
       const text = menu('environment').value;
       void this.open(this.source, text === '' ? undefined : surroundingsOf(text));
     });
-    menu('scene').addEventListener('change', () => void this.open({ kind: 'builtin', name: menu('scene').value }, this.surroundings));
     menu('technique').addEventListener('change', () => this.chooseTechnique(menu('technique').value));
     menu('view').addEventListener('change', () => {
       this.state.view = menu('view').value;

@@ -9,14 +9,14 @@ async function read(file: File): Promise<{ name: string; bytes: Uint8Array }> {
   }
 }
 
-/** Reads `files`: a scene, an environment map, or both. Rejects with NOT_A_SCENE or IO. */
+/** What `files` are: a scene, an environment map (which is read), or both. Rejects with NOT_A_SCENE or IO. */
 export async function readDropped(files: readonly File[]): Promise<{ source?: SceneSource; surroundings?: Surroundings }> {
   const isMap = ({ name }: File) => /\.(hdr|exr)$/i.test(name);
   const map = files.find(isMap);
   const others = files.filter((file) => !isMap(file));
   return {
     ...(map && { surroundings: await read(map) }),
-    ...((others.length > 0 || !map) && { source: await readFiles(others) }),
+    ...((others.length > 0 || !map) && { source: sceneOf(others) }),
   };
 }
 
@@ -25,11 +25,14 @@ export function surroundingsOf(text: string): Surroundings {
   return /^(sky|white)(:|$)/.test(text) ? { name: text } : { name: text, address: new URL(text, location.href).href };
 }
 
-/** Reads `files`, of which one is a .glb or .gltf. Rejects with NOT_A_SCENE or IO. */
-export async function readFiles(files: readonly File[]): Promise<SceneSource> {
-  const main = files.find(({ name }) => /\.(glb|gltf)$/i.test(name));
-  if (!main) throw { code: 'NOT_A_SCENE', message: `${files.map(({ name }) => name).join(', ') || 'Nothing'} is neither .glb nor .gltf, nor an environment map, .hdr or .exr.` };
-  return { kind: 'file', name: main.name, files: await Promise.all(files.map(read)) };
+/** The scene among `files`: a .glb, .gltf, .obj or .restir. Throws NOT_A_SCENE. The worker reads them. */
+export function sceneOf(files: readonly File[]): SceneSource {
+  const main = files.find(({ name }) => /\.(glb|gltf|obj|restir)$/i.test(name));
+  if (!main) {
+    const names = files.map(({ name }) => name).join(', ') || 'Nothing';
+    throw { code: 'NOT_A_SCENE', message: `${names} is neither .glb, .gltf, .obj nor .restir, nor an environment map, .hdr or .exr.` };
+  }
+  return { kind: 'file', name: main.name, files: [...files], choice: {} };
 }
 
 /** Calls `dropped` with what is dropped anywhere on the page; `hint` is shown while something hovers. */

@@ -32,7 +32,7 @@ const known: Record<string, { title: string; advice: string }> = {
   BAD_VALUE: { title: 'A value is out of range', advice: 'The former value stays.' },
   IO: { title: 'A file could not be read', advice: 'Check the connection and the file, then try again.' },
   WORKER: { title: 'Loading stopped', advice: 'Reload the page; if the scene is large, try a smaller one.' },
-  NOT_A_SCENE: { title: 'This is not a scene', advice: 'Drop a .glb file, or a .gltf together with its .bin and image files. An environment map is an .hdr or .exr file.' },
+  NOT_A_SCENE: { title: 'This is not a scene', advice: 'Drop a .glb or .restir file, or a .gltf or .obj together with the files that it names. An environment map is an .hdr or .exr file.' },
 };
 
 /** Any thrown value as a `Failure`. */

@@ -36,7 +36,8 @@ export function clearError(): void {
 }
 
 /** Shows how far a load is (0 to 1) and what it does; undefined hides the bar. */
-export function showProgress(fraction: number | undefined, what = ''): void {
+export function showProgress(fraction: number | undefined, what = '', { cancellable = true } = {}): void {
+  byId('cancel', HTMLButtonElement).disabled = !cancellable;
   byId('loading', HTMLElement).hidden = fraction === undefined;
   byId('loading-bar', HTMLProgressElement).value = fraction ?? 0;
   byId('loading-text', HTMLElement).textContent = what;

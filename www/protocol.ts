@@ -1,10 +1,22 @@
 // The messages between the page and the worker that reads scenes.
 import type { Failure } from './api.js';
 
-/** Where a scene comes from: a built-in by name, or a glTF file with the files that lie beside it. */
-export type SceneSource =
-  | { kind: 'builtin'; name: string }
-  | { kind: 'file'; name: string; files: { name: string; bytes: Uint8Array }[] };
+/** What of a glTF file to show: a scene other than the default one, a material variant. */
+export interface Choice {
+  scene?: number;
+  variant?: string;
+}
+
+/** Where a scene comes from: a built-in by name, or a scene file with the files that lie beside it. */
+export type SceneSource = { kind: 'builtin'; name: string } | { kind: 'file'; name: string; files: File[]; choice: Choice };
+
+/** What can be chosen in a glTF file. */
+export interface Contents {
+  scenes: string[];
+  /** Index of the default scene. */
+  scene: number;
+  variants: string[];
+}
 
 /** What surrounds a scene instead of its own environment: `sky...` or `white`, or a map's bytes, or where to find them. */
 export interface Surroundings {
@@ -22,7 +34,13 @@ export interface LoadRequest {
   seed: number;
 }
 
+/** A scene as the worker made it. */
+export interface Loaded {
+  flat: Uint8Array;
+  contents?: Contents;
+}
+
 export type LoadResponse =
   | { kind: 'progress'; fraction: number; what: string }
-  | { kind: 'scene'; flat: Uint8Array }
+  | ({ kind: 'scene' } & Loaded)
   | { kind: 'failure'; failure: Failure };

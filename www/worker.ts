@@ -1,7 +1,7 @@
 // Reads or generates one scene and builds its BVH, off the page's thread.
-import init, { flatten_builtin, flatten_file } from './pkg/restir.js';
+import init, { contents_of, flatten_builtin, flatten_file, uncook } from './pkg/restir.js';
 import { toFailure } from './messages.js';
-import type { LoadRequest, LoadResponse, Surroundings } from './protocol.js';
+import type { Contents, LoadRequest, LoadResponse, Loaded, SceneSource, Surroundings } from './protocol.js';
 
 const reply = (response: LoadResponse, transfer: Transferable[] = []) => self.postMessage(response, { transfer });
 
@@ -33,21 +33,63 @@ async function fetched({ name, address = '' }: Surroundings): Promise<Uint8Array
   throw { code: 'IO', message: `${name}: ${problem}` };
 }
 
-async function flatten({ source, surroundings, lights, seed }: LoadRequest): Promise<Uint8Array> {
-  const environment = surroundings?.name;
-  const map = surroundings?.address ? await fetched(surroundings) : surroundings?.bytes;
-  if (source.kind === 'builtin') return flatten_builtin(source.name, lights, seed, environment, map, progress);
-  const files = new Map(source.files.map(({ name, bytes }) => [baseName(name), bytes]));
-  const resolve = (uri: string) => files.get(baseName(decoded(uri)));
-  const main = files.get(baseName(source.name)) ?? new Uint8Array();
-  return flatten_file(source.name, main, resolve, lights, seed, environment, map, progress);
+/** Decoders that only some files need are a module of their own. */
+async function fetchDecoders() {
+  progress(0, 'Fetching decoders');
+  const decoders = await import('./pkg/decoders.js');
+  await decoders.default();
+  return decoders;
+}
+
+async function read(file: File): Promise<[string, Uint8Array]> {
+  try {
+    return [baseName(file.name), new Uint8Array(await file.arrayBuffer())];
+  } catch (error) {
+    throw { code: 'IO', message: `${file.name}: ${(error as Error).message}` };
+  }
+}
+
+/** Name and bytes of what surrounds the scene. */
+type Around = [environment: string | undefined, map: Uint8Array | undefined];
+
+async function flattenFile({ name, files, choice }: SceneSource & { kind: 'file' }, lights: number, seed: number, around: Around): Promise<Loaded> {
+  progress(0, 'Reading');
+  const beside = new Map(await Promise.all(files.map(read)));
+  const resolve = (uri: string) => beside.get(baseName(decoded(uri)));
+  const main = beside.get(baseName(name)) ?? new Uint8Array();
+  const flatten = (bytes: Uint8Array, decoders: object | undefined, warnings: string[]) =>
+    flatten_file(name, bytes, resolve, { ...choice, decoders, warnings }, lights, seed, ...around, progress);
+
+  if (/\.restir$/i.test(name)) {
+    if (around[0] !== undefined) throw { code: 'UNSUPPORTED', message: `${name} is cooked and keeps its own environment.` };
+    return { flat: uncook(name, main) };
+  }
+  if (/\.obj$/i.test(name)) {
+    const { convert_obj } = await fetchDecoders();
+    try {
+      const { glb, warnings } = convert_obj(main, resolve) as { glb: Uint8Array; warnings: string[] };
+      return { flat: flatten(glb, undefined, warnings) };
+    } catch (error) {
+      const { code, message } = toFailure(error);
+      throw { code, message: message.startsWith(name) ? message : `${name}: ${message}` };
+    }
+  }
+  const contents = JSON.parse(contents_of(name, main)) as Contents & { needs_decoders: boolean };
+  const decoders = contents.needs_decoders ? await fetchDecoders() : undefined;
+  return { flat: flatten(main, decoders, []), contents };
+}
+
+async function load({ source, surroundings, lights, seed }: LoadRequest): Promise<Loaded> {
+  const around: Around = [surroundings?.name, surroundings?.address ? await fetched(surroundings) : surroundings?.bytes];
+  if (source.kind === 'builtin') return { flat: flatten_builtin(source.name, lights, seed, ...around, progress) };
+  return flattenFile(source, lights, seed, around);
 }
 
 self.onmessage = async ({ data }: MessageEvent<LoadRequest>) => {
   try {
     await init({ module_or_path: data.module });
-    const flat = await flatten(data);
-    reply({ kind: 'scene', flat }, [flat.buffer]);
+    const loaded = await load(data);
+    reply({ kind: 'scene', ...loaded }, [loaded.flat.buffer]);
   } catch (error) {
     reply({ kind: 'failure', failure: toFailure(error) });
   }

@@ -2,6 +2,7 @@
 
 use super::Gpu;
 use crate::error::{Error, Result};
+use crate::pace::{Pace, SLICE_BYTES};
 
 /// Texels of a row: every WebGPU device can hold that many.
 const ROW: u64 = 8192;
@@ -23,8 +24,30 @@ impl DataTexture {
     /// # Errors
     /// `LIMIT` if it has more rows than the device allows.
     pub fn new<T: bytemuck::Pod>(gpu: &Gpu, label: &str, data: &[T]) -> Result<Self> {
-        let bytes: &[u8] = bytemuck::cast_slice(data);
-        let texels = (bytes.len() as u64 / TEXEL).max(1);
+        let data_texture = Self::empty(gpu, label, size_of_val(data))?;
+        data_texture.write(gpu, 0, data);
+        Ok(data_texture)
+    }
+
+    /// As [`DataTexture::new`], in slices.
+    ///
+    /// # Errors
+    /// As [`DataTexture::new`].
+    pub async fn in_slices<T: bytemuck::Pod>(gpu: &Gpu, label: &str, data: &[T], pace: &mut Pace) -> Result<Self> {
+        let data_texture = Self::empty(gpu, label, size_of_val(data))?;
+        // Whole rows.
+        let texels: &[[u32; 4]] = bytemuck::cast_slice(data);
+        let slice = SLICE_BYTES / (ROW * TEXEL) as usize * ROW as usize;
+        for (part, first) in texels.chunks(slice).zip((0u64..).step_by(slice)) {
+            data_texture.write(gpu, first, part);
+            pace.breathe().await;
+        }
+        Ok(data_texture)
+    }
+
+    /// A texture for `bytes` bytes.
+    fn empty(gpu: &Gpu, label: &str, bytes: usize) -> Result<Self> {
+        let texels = (bytes as u64 / TEXEL).max(1);
         let (rows, had) = (texels.div_ceil(ROW), u64::from(gpu.device.limits().max_texture_dimension_2d));
         if rows > had {
             let (wanted, had) = (texels * TEXEL, had * ROW * TEXEL);
@@ -41,9 +64,7 @@ impl DataTexture {
             view_formats: &[],
         });
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let data_texture = DataTexture { texture, view };
-        data_texture.write(gpu, 0, data);
-        Ok(data_texture)
+        Ok(DataTexture { texture, view })
     }
 
     /// Overwrites records from texel `first` on. What lies past the texture's end is left out.

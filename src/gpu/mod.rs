@@ -13,6 +13,7 @@ pub mod binding_kind;
 pub mod shader_source;
 
 use crate::error::{Error, Result};
+use crate::pace::{Pace, SLICE_BYTES};
 use shader::{Pipeline, SceneFeatures, Shader};
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -235,6 +236,25 @@ impl Gpu {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         let buffer = self.storage(label, bytes.len() as u64)?;
         self.queue.write_buffer(&buffer, 0, bytes);
+        Ok(buffer)
+    }
+
+    /// As [`Gpu::storage_of`], in slices.
+    ///
+    /// # Errors
+    /// `LIMIT` if the device does not allow it.
+    pub async fn storage_in_slices<T: bytemuck::Pod>(
+        &self,
+        label: &str,
+        data: &[T],
+        pace: &mut Pace,
+    ) -> Result<wgpu::Buffer> {
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let buffer = self.storage(label, bytes.len() as u64)?;
+        for (part, offset) in bytes.chunks(SLICE_BYTES).zip((0u64..).step_by(SLICE_BYTES)) {
+            self.queue.write_buffer(&buffer, offset, part);
+            pace.breathe().await;
+        }
         Ok(buffer)
     }
 

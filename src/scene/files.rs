@@ -25,3 +25,9 @@ pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
     file.take(limit + 1).read_to_end(&mut bytes).map_err(io_error)?;
     if bytes.len() as u64 > limit { Err(too_large(bytes.len() as u64)) } else { Ok(bytes) }
 }
+
+/// Reads files that a scene at `path` names relative to its folder.
+pub(crate) fn beside(path: &Path, limit: u64) -> impl FnMut(&str) -> Result<Vec<u8>> {
+    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+    move |relative| read(&folder.join(relative), limit)
+}

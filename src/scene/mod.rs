@@ -16,6 +16,8 @@ pub mod gpu_types;
 pub mod intersect;
 mod lights;
 mod material;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod obj;
 pub mod octahedral;
 pub mod random;
 pub mod shapes;

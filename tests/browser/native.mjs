@@ -17,3 +17,15 @@ export async function renderNatively(scene, options) {
     rmSync(folder, { recursive: true });
   }
 }
+
+/** The file that `restir cook SCENE` writes. */
+export async function cook(scene) {
+  const folder = mkdtempSync(join(tmpdir(), 'restir-native-'));
+  const file = join(folder, 'scene.restir');
+  try {
+    await run(['cargo', 'run', '--quiet', '--', 'cook', scene, '--out', file], { env: softwareEnvironment() });
+    return readFileSync(file);
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+}

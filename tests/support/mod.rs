@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
 pub mod bsdf;
+pub mod extensions;
 pub mod gltf_writer;
 pub mod harness;
 pub mod plate;
@@ -26,9 +27,14 @@ pub fn fresh_gpu() -> Gpu {
         .expect("a Vulkan driver (Debian: mesa-vulkan-drivers)")
 }
 
-/// Says that a test does not run, and why. Aloud: what `eprintln!` prints is only shown of tests that fail.
+/// Says that a test does not run, and why.
 pub fn skip(test: &str, why: &str) {
-    let _ = writeln!(std::io::stderr(), "skipped {test}: {why}");
+    say(&format!("skipped {test}: {why}"));
+}
+
+/// A line on stderr. Aloud: what `eprintln!` prints is only shown of tests that fail.
+pub fn say(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 /// A file of the folder `shared` beside the repository, or nothing and a word about it: such files are too large to

@@ -7,7 +7,7 @@ use crate::{progress, report};
 /// Measure the GPU time of each pass and the rays a second.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A .glb or .gltf file, or builtin:NAME (see `restir scenes`).
+    /// A .glb, .gltf, .obj or .restir file, or builtin:NAME (see `restir scenes`).
     #[arg(value_name = "SCENE", default_value = "builtin:cornell")]
     scene: String,
     #[command(flatten)]

@@ -7,9 +7,11 @@ use restir::scene::flat::{SceneStats, TextureStats};
 /// Show what a scene holds: triangles, lights, bytes, the BVH, warnings.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A .glb or .gltf file, or builtin:NAME (see `restir scenes`).
+    /// A .glb, .gltf, .obj or .restir file, or builtin:NAME (see `restir scenes`).
     #[arg(value_name = "SCENE")]
     scene: String,
+    #[command(flatten)]
+    choice: scene::Choice,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -21,6 +23,9 @@ struct Info {
     #[serde(flatten)]
     stats: SceneStats,
     cameras: Vec<String>,
+    /// Of a glTF file: what --scene-index and --variant choose from.
+    scenes: Vec<String>,
+    variants: Vec<String>,
     moving_lights: usize,
     /// Lowest and highest corner in metres.
     bounds: [[f32; 3]; 2],
@@ -28,11 +33,14 @@ struct Info {
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    let flat = scene::flatten(&scene::load(&args.scene)?)?;
+    let flat = scene::open(&args.scene, &args.choice, None)?;
+    let contents = scene::contents(&args.scene)?;
     let info = Info {
         name: flat.name,
         stats: flat.stats,
         cameras: flat.cameras.into_iter().map(|camera| camera.name).collect(),
+        scenes: contents.scenes,
+        variants: contents.variants,
         moving_lights: flat.motions.len(),
         bounds: flat.bounds.map(|corner| corner.to_array()),
         warnings: flat.warnings,
@@ -46,6 +54,7 @@ pub fn run(args: &Args) -> Result<()> {
 
 fn table(info: &Info) -> String {
     let (stats, [low, high]) = (&info.stats, info.bounds);
+    let listed = |names: &[String]| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
     [
         format!("name       {}", info.name),
         format!("triangles  {} (and {} dropped without area)", stats.triangles, stats.dropped_triangles),
@@ -55,6 +64,8 @@ fn table(info: &Info) -> String {
         format!("lights     {} ({} emissive triangles)", stats.lights, stats.emissive_triangles),
         format!("moving     {} lights", info.moving_lights),
         format!("cameras    {}", info.cameras.join(", ")),
+        format!("scenes     {}", listed(&info.scenes)),
+        format!("variants   {}", listed(&info.variants)),
         format!("bounds     {low:?} to {high:?} m"),
         format!("bvh        {} nodes, depth {}, cost {:.1}", stats.bvh_nodes, stats.bvh_depth, stats.bvh_cost),
         format!("memory     {:.1} MiB on the GPU", mebibytes(stats.gpu_bytes)),

@@ -2,6 +2,7 @@
 
 mod bench;
 mod compare;
+mod cook;
 mod failure;
 mod info;
 mod options;
@@ -34,6 +35,7 @@ enum Command {
     Techniques(techniques::Args),
     Scenes(scenes::Args),
     Info(info::Args),
+    Cook(cook::Args),
     Bench(bench::Args),
 }
 
@@ -44,6 +46,7 @@ fn run(command: Command) -> Result<()> {
         Command::Techniques(args) => techniques::run(&args),
         Command::Scenes(args) => scenes::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Cook(args) => cook::run(&args),
         Command::Bench(args) => bench::run(&args),
     }
 }

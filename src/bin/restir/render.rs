@@ -15,7 +15,7 @@ const DEFAULT_FRAMES: u32 = 16;
 /// Render a scene to a PNG (tone-mapped) or OpenEXR (linear) file.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A .glb or .gltf file, or builtin:NAME (see `restir scenes`).
+    /// A .glb, .gltf, .obj or .restir file, or builtin:NAME (see `restir scenes`).
     #[arg(value_name = "SCENE")]
     scene: String,
     #[command(flatten)]

@@ -3,7 +3,8 @@
 use crate::failure::{Failure, Result};
 use crate::progress;
 use restir::Error;
-use restir::scene::{Camera, FlatScene, Scene, builtin, environment, gltf};
+use restir::scene::flat::cooked;
+use restir::scene::{Camera, FlatScene, Scene, builtin, environment, gltf, obj};
 use std::path::Path;
 
 /// What lights a scene beyond its own lights.
@@ -18,21 +19,86 @@ pub struct Lighting {
     pub lights: Option<u32>,
 }
 
-/// Reads a file or makes a built-in scene.
-pub fn load(name: &str) -> Result<Scene> {
-    if let Some(builtin) = name.strip_prefix("builtin:") {
-        return builtin::make(builtin).map_err(Failure::from_option);
-    }
-    let path = Path::new(name);
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    match extension.as_str() {
-        "glb" | "gltf" => Ok(gltf::load_file(path)?),
-        _ => Err(Failure::usage("SCENE", format!("'{name}' is neither a .glb or .gltf file nor builtin:NAME"))),
+/// What is loaded of a scene's file.
+#[derive(clap::Args)]
+pub struct Choice {
+    /// Index of the scene of a glTF file to load instead of its default (see `restir info`).
+    #[arg(long, value_name = "N")]
+    pub scene_index: Option<usize>,
+    /// Material variant of a glTF file to show (KHR_materials_variants; see `restir info`).
+    #[arg(long, value_name = "NAME")]
+    pub variant: Option<String>,
+}
+
+impl Choice {
+    /// Whether there is one.
+    fn is_made(&self) -> bool {
+        self.scene_index.is_some() || self.variant.is_some()
     }
 }
 
+/// Reads or makes the scene `name` and flattens it, with progress on stderr; with `lighting`, and its seed, it is lit
+/// first. A cooked scene is read as it is.
+pub fn open(name: &str, choice: &Choice, lighting: Option<(&Lighting, u32)>) -> Result<FlatScene> {
+    let path = Path::new(name);
+    if !name.starts_with("builtin:") && extension(path) == "restir" {
+        let lit = lighting.is_some_and(|(lighting, _)| lighting.environment.is_some() || lighting.lights.is_some());
+        if lit || choice.is_made() {
+            return Err(Failure::usage(
+                "SCENE",
+                format!("'{name}' is cooked: light it and choose from it when cooking"),
+            ));
+        }
+        return Ok(cooked::load_file(path)?);
+    }
+    let mut scene = load(name, choice)?;
+    if let Some((lighting, seed)) = lighting {
+        light(&mut scene, lighting, seed)?;
+    }
+    flatten(&scene)
+}
+
+/// Reads a file or makes a built-in scene.
+fn load(name: &str, choice: &Choice) -> Result<Scene> {
+    let only_gltf = |scene| match choice.is_made() {
+        true => Err(Failure::usage(
+            "SCENE",
+            format!("'{name}' is no glTF file: --scene-index and --variant choose from one"),
+        )),
+        false => Ok(scene),
+    };
+    if let Some(builtin) = name.strip_prefix("builtin:") {
+        return builtin::make(builtin).map_err(Failure::from_option).and_then(only_gltf);
+    }
+    let path = Path::new(name);
+    let options =
+        gltf::Options { scene: choice.scene_index, variant: choice.variant.as_deref(), ..gltf::Options::default() };
+    match extension(path).as_str() {
+        "glb" | "gltf" => gltf::load_file(path, &options).map_err(Failure::from_option),
+        "obj" => obj::load_file(path).map_err(Failure::from).and_then(only_gltf),
+        _ => Err(Failure::usage(
+            "SCENE",
+            format!("'{name}' is neither a .glb, .gltf, .obj or .restir file nor builtin:NAME"),
+        )),
+    }
+}
+
+/// What can be chosen in a glTF file; nothing in others.
+pub fn contents(name: &str) -> Result<gltf::Contents> {
+    let path = Path::new(name);
+    if name.starts_with("builtin:") || !["glb", "gltf"].contains(&extension(path).as_str()) {
+        return Ok(gltf::Contents::default());
+    }
+    Ok(gltf::contents_of_file(path)?)
+}
+
+/// In lower case.
+fn extension(path: &Path) -> String {
+    path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase()
+}
+
 /// Adds the environment given, or, where there is no light at all, scattered lights or a sky.
-pub fn light(scene: &mut Scene, lighting: &Lighting, seed: u32) -> Result<()> {
+fn light(scene: &mut Scene, lighting: &Lighting, seed: u32) -> Result<()> {
     if let Some(name) = &lighting.environment
         && !scene.surround(name).map_err(Failure::from_option)?
     {
@@ -47,7 +113,7 @@ pub fn light(scene: &mut Scene, lighting: &Lighting, seed: u32) -> Result<()> {
 }
 
 /// Flattens a scene, with progress on stderr.
-pub fn flatten(scene: &Scene) -> Result<FlatScene> {
+fn flatten(scene: &Scene) -> Result<FlatScene> {
     let spinner = progress::spinner();
     let flat = FlatScene::build(scene, &mut |fraction, doing| {
         spinner.set_message(format!("{doing} {:.0} %", 100.0 * fraction));

@@ -33,6 +33,8 @@ pub struct Options {
     #[arg(long, value_name = "N", value_parser = options::max_depth)]
     pub max_depth: Option<u32>,
     #[command(flatten)]
+    pub choice: scene::Choice,
+    #[command(flatten)]
     pub lighting: scene::Lighting,
 }
 
@@ -74,9 +76,7 @@ impl Session {
         for (key, value) in &options.set {
             options::check_value(technique, key, value).map_err(Failure::from_option)?;
         }
-        let mut scene = scene::load(name)?;
-        scene::light(&mut scene, &options.lighting, options.seed)?;
-        let flat = scene::flatten(&scene)?;
+        let flat = scene::open(name, &options.choice, Some((&options.lighting, options.seed)))?;
         report::warnings(&flat.warnings);
         let camera = scene::camera(&flat.cameras, options.camera.as_deref())?.clone();
         let (scene, stats, warnings) = (flat.name.clone(), flat.stats.clone(), flat.warnings.clone());

@@ -1,11 +1,12 @@
 //! A flat scene as one run of bytes and back: how a Worker hands it to the page.
 //!
 //! `RSTR`, version, length of the header (u32 each), 0; the header as JSON; then the arrays in the order of [`Sections`],
-//! the texture arrays and the environment, each
-//! beginning at a multiple of 16. Little-endian throughout.
+//! the texture arrays and the environment, each beginning
+//! at a multiple of 16. Little-endian throughout.
 
 use super::{FlatEnvironment, FlatScene, SceneStats, TextureArray, validate};
 use crate::error::{Error, Result};
+use crate::pace::{Pace, SLICE_BYTES};
 use crate::scene::{Camera, LightMotion, Projection};
 use bytemuck::Pod;
 use glam::Vec3;
@@ -14,7 +15,8 @@ use serde::{Deserialize, Serialize};
 const _: () = assert!(cfg!(target_endian = "little"), "arrays are copied as they lie in memory");
 
 const MAGIC: [u8; 4] = *b"RSTR";
-const VERSION: u32 = 3;
+/// Of the layout: to be raised by each change to the header, the arrays or their elements.
+pub(super) const VERSION: u32 = 3;
 const PREFIX: usize = 16;
 const ALIGNMENT: usize = 16;
 
@@ -86,26 +88,51 @@ impl FlatScene {
         out.extend((header.len() as u32).to_le_bytes());
         out.extend([0; 4]);
         out.extend(header);
-        let mut section = |bytes: &[u8]| {
+        for section in self.sections() {
             out.resize(out.len().next_multiple_of(ALIGNMENT), 0);
-            out.extend_from_slice(bytes);
-        };
-        section(bytemuck::cast_slice(&self.nodes));
-        section(bytemuck::cast_slice(&self.triangles));
-        section(bytemuck::cast_slice(&self.attributes));
-        section(bytemuck::cast_slice(&self.meshes));
-        section(bytemuck::cast_slice(&self.instances));
-        section(bytemuck::cast_slice(&self.materials));
-        section(bytemuck::cast_slice(&self.material_extensions));
-        section(bytemuck::cast_slice(&self.lights));
-        for array in &self.textures {
-            section(&array.texels);
-        }
-        if let Some(environment) = &self.environment {
-            section(bytemuck::cast_slice(&environment.radiance));
-            section(bytemuck::cast_slice(&environment.alias));
+            out.extend_from_slice(section);
         }
         out
+    }
+
+    /// The large arrays in the order in which they are written.
+    fn sections(&self) -> Vec<&[u8]> {
+        let mut sections: Vec<&[u8]> = vec![
+            bytemuck::cast_slice(&self.nodes),
+            bytemuck::cast_slice(&self.triangles),
+            bytemuck::cast_slice(&self.attributes),
+            bytemuck::cast_slice(&self.meshes),
+            bytemuck::cast_slice(&self.instances),
+            bytemuck::cast_slice(&self.materials),
+            bytemuck::cast_slice(&self.material_extensions),
+            bytemuck::cast_slice(&self.lights),
+        ];
+        sections.extend(self.textures.iter().map(|array| &array.texels[..]));
+        if let Some(environment) = &self.environment {
+            sections.push(bytemuck::cast_slice(&environment.radiance));
+            sections.push(bytemuck::cast_slice(&environment.alias));
+        }
+        sections
+    }
+
+    /// As `sections`, to be filled.
+    fn sections_mut(&mut self) -> Vec<&mut [u8]> {
+        let mut sections: Vec<&mut [u8]> = vec![
+            bytemuck::cast_slice_mut(&mut self.nodes),
+            bytemuck::cast_slice_mut(&mut self.triangles),
+            bytemuck::cast_slice_mut(&mut self.attributes),
+            bytemuck::cast_slice_mut(&mut self.meshes),
+            bytemuck::cast_slice_mut(&mut self.instances),
+            bytemuck::cast_slice_mut(&mut self.materials),
+            bytemuck::cast_slice_mut(&mut self.material_extensions),
+            bytemuck::cast_slice_mut(&mut self.lights),
+        ];
+        sections.extend(self.textures.iter_mut().map(|array| &mut array.texels[..]));
+        if let Some(environment) = &mut self.environment {
+            sections.push(bytemuck::cast_slice_mut(&mut environment.radiance));
+            sections.push(bytemuck::cast_slice_mut(&mut environment.alias));
+        }
+        sections
     }
 
     /// Reads what [`FlatScene::to_bytes`] wrote. Every length and index is checked, so that the result is as safe to render
@@ -114,7 +141,43 @@ impl FlatScene {
     /// # Errors
     /// [`Error::BadFile`] with the place of the first fault.
     pub fn from_bytes(bytes: &[u8]) -> Result<FlatScene> {
-        let mut reader = Reader { bytes, position: 0 };
+        let (mut scene, mut position) = Self::hollow(bytes, bytes.len())?;
+        for section in scene.sections_mut() {
+            position = position.next_multiple_of(ALIGNMENT);
+            section.copy_from_slice(&bytes[position..position + section.len()]);
+            position += section.len();
+        }
+        validate::validate(&scene).map_err(|(place, what)| bad(place, what))?;
+        Ok(scene)
+    }
+
+    /// As [`FlatScene::from_bytes`] in slices, for bytes that this program's own Worker has made a moment ago: lengths are
+    /// checked, indices are not. `read` fills a slice with the bytes from an offset on; there are `length` of them.
+    ///
+    /// # Errors
+    /// [`Error::BadFile`] for lengths that do not fit.
+    pub async fn receive(length: usize, read: impl Fn(usize, &mut [u8]), pace: &mut Pace) -> Result<FlatScene> {
+        let mut head = vec![0; length.min(PREFIX)];
+        read(0, &mut head);
+        let header_length = head.get(8..12).map_or(0, |word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
+        head.resize(length.min(PREFIX + header_length as usize), 0);
+        read(0, &mut head);
+        let (mut scene, mut position) = Self::hollow(&head, length)?;
+        for section in scene.sections_mut() {
+            position = position.next_multiple_of(ALIGNMENT);
+            for part in section.chunks_mut(SLICE_BYTES) {
+                read(position, part);
+                position += part.len();
+                pace.breathe().await;
+            }
+        }
+        Ok(scene)
+    }
+
+    /// The scene that `length` bytes, of which `head` are at least the header, describe, its arrays full of zeros; and
+    /// where the first of them begins.
+    fn hollow(head: &[u8], length: usize) -> Result<(FlatScene, usize)> {
+        let mut reader = Reader { head, length, position: 0 };
         let prefix = reader.take(PREFIX, "prefix")?;
         let word = |i: usize| {
             let mut word = [0; 4];
@@ -128,6 +191,7 @@ impl FlatScene {
             return Err(bad("prefix", format!("version {} instead of {VERSION}", u32::from_le_bytes(word(1)))));
         }
         let header = reader.take(u32::from_le_bytes(word(2)) as usize, "header")?;
+        let first = reader.position;
         let header: Header = serde_json::from_slice(header).map_err(|e| bad("header", e.to_string()))?;
         let Sections {
             nodes,
@@ -167,11 +231,10 @@ impl FlatScene {
             stats: header.stats,
             warnings: header.warnings,
         };
-        if reader.position != bytes.len() {
-            return Err(bad("end", format!("{} bytes too many", bytes.len() - reader.position)));
+        if reader.position != length {
+            return Err(bad("end", format!("{} bytes too many", length - reader.position)));
         }
-        validate::validate(&scene).map_err(|(place, what)| bad(place, what))?;
-        Ok(scene)
+        Ok((scene, first))
     }
 }
 
@@ -179,30 +242,38 @@ fn bad(place: impl Into<String>, what: impl Into<String>) -> Error {
     Error::bad_file("flattened scene", place, what)
 }
 
+/// Goes through the bytes in order; only those of `head` are there.
 struct Reader<'a> {
-    bytes: &'a [u8],
+    head: &'a [u8],
+    length: usize,
     position: usize,
 }
 
 impl<'a> Reader<'a> {
-    fn take(&mut self, length: usize, place: &str) -> Result<&'a [u8]> {
-        let rest = self.bytes.get(self.position..).unwrap_or_default();
-        let taken = rest.get(..length).ok_or_else(|| {
-            bad(place, format!("{length} bytes were promised, {} are left (byte {})", rest.len(), self.position))
-        })?;
+    /// Passes over bytes that must be promised.
+    fn skip(&mut self, length: usize, place: &str) -> Result<()> {
+        let left = self.length.saturating_sub(self.position);
+        if length > left {
+            let what = format!("{length} bytes were promised, {left} are left (byte {})", self.position);
+            return Err(bad(place, what));
+        }
         self.position += length;
-        Ok(taken)
+        Ok(())
     }
 
-    /// Allocates only what the bytes are there for.
+    fn take(&mut self, length: usize, place: &str) -> Result<&'a [u8]> {
+        let start = self.position;
+        self.skip(length, place)?;
+        self.head.get(start..self.position).ok_or_else(|| bad(place, "it is not there"))
+    }
+
+    /// Zeros, as many as the bytes are there for.
     fn array<T: Pod>(&mut self, count: usize, place: &str) -> Result<Vec<T>> {
         let padding = self.position.next_multiple_of(ALIGNMENT) - self.position;
-        self.take(padding, place)?;
+        self.skip(padding, place)?;
         let length = count.checked_mul(size_of::<T>()).ok_or_else(|| bad(place, "absurd length"))?;
-        let bytes = self.take(length, place)?;
-        let mut array = vec![T::zeroed(); count];
-        bytemuck::cast_slice_mut(&mut array).copy_from_slice(bytes);
-        Ok(array)
+        self.skip(length, place)?;
+        Ok(bytemuck::zeroed_vec(count))
     }
 }
 

@@ -1,6 +1,7 @@
 //! A scene as plain arrays with a BVH: what is uploaded, sent from a Worker to the page, and kept to rebuild a lost device.
 
 mod bytes;
+pub mod cooked;
 mod emission;
 pub(crate) mod environment;
 mod extensions;

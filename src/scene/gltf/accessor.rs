@@ -10,26 +10,40 @@ use gltf::json::accessor::{Accessor, ComponentType, Type, sparse::Sparse};
 pub(super) struct Shape {
     types: &'static [Type],
     components: &'static [ComponentType],
+    /// More components that KHR_mesh_quantization allows.
+    quantized: &'static [ComponentType],
 }
 
-use ComponentType::{F32, U8, U16, U32};
+use ComponentType::{F32, I8, I16, U8, U16, U32};
 
-/// Positions and normals.
-pub(super) const VEC3: Shape = Shape { types: &[Type::Vec3], components: &[F32] };
+const VEC3: &[Type] = &[Type::Vec3];
+const VEC4: &[Type] = &[Type::Vec4];
+
+/// Positions.
+pub(super) const POSITION: Shape = Shape { types: VEC3, components: &[F32], quantized: &[I8, U8, I16, U16] };
+/// Normals.
+pub(super) const NORMAL: Shape = Shape { types: VEC3, components: &[F32], quantized: &[I8, I16] };
 /// Tangents.
-pub(super) const VEC4: Shape = Shape { types: &[Type::Vec4], components: &[F32] };
-/// Texture coordinates; integers are normalised.
-pub(super) const TEXCOORD: Shape = Shape { types: &[Type::Vec2], components: &[F32, U8, U16] };
+pub(super) const TANGENT: Shape = Shape { types: VEC4, components: &[F32], quantized: &[I8, I16] };
+/// Texture coordinates; integers are normalised, unless KHR_mesh_quantization says otherwise.
+pub(super) const TEXCOORD: Shape =
+    Shape { types: &[Type::Vec2], components: &[F32, U8, U16], quantized: &[I8, U8, I16, U16] };
 /// Colours; integers are normalised.
-pub(super) const COLOR: Shape = Shape { types: &[Type::Vec3, Type::Vec4], components: &[F32, U8, U16] };
+pub(super) const COLOR: Shape = Shape { types: &[Type::Vec3, Type::Vec4], components: &[F32, U8, U16], quantized: &[] };
+/// Translations and scales of instances.
+pub(super) const FLOAT_VEC3: Shape = Shape { types: VEC3, components: &[F32], quantized: &[] };
+/// Rotations of instances; integers are normalised.
+pub(super) const QUATERNION: Shape = Shape { types: VEC4, components: &[F32, I8, I16], quantized: &[] };
 /// Vertex indices.
-pub(super) const INDEX: Shape = Shape { types: &[Type::Scalar], components: &[U8, U16, U32] };
+pub(super) const INDEX: Shape = Shape { types: &[Type::Scalar], components: &[U8, U16, U32], quantized: &[] };
 
 /// The checked elements of one accessor.
 pub(super) struct Elements<'a> {
     /// Number of elements.
     pub count: usize,
     component: ComponentType,
+    /// Whether integers stand for [0, 1] or [-1, 1].
+    normalized: bool,
     /// Bytes of one element.
     size: usize,
     stride: usize,
@@ -53,11 +67,7 @@ impl<'a> Elements<'a> {
         let place = format!("{place} = accessors[{index}]");
         let kind = document.valid(&accessor.type_, &place)?;
         let component = document.valid(&accessor.component_type, &place)?.0;
-        if !shape.types.contains(&kind) || !shape.components.contains(&component) {
-            let what =
-                format!("elements are {kind:?} of {component:?}, not {:?} of {:?}", shape.types, shape.components);
-            return Err(document.bad(&place, what));
-        }
+        shape.check(document, kind, component, &place)?;
         let size = component.size() * kind.multiplicity();
         // Elements are counted with u32 indices; u32::MAX itself stays free.
         let count = u32::try_from(accessor.count.0).ok().filter(|&count| count < u32::MAX);
@@ -68,7 +78,31 @@ impl<'a> Elements<'a> {
             Some(sparse) => Some(open_sparse(document, buffers, budget, sparse, count, size, &place)?),
             None => None,
         };
-        Ok(Elements { count, component, size, stride, base, sparse })
+        Ok(Elements { count, component, normalized: is_normalized(document, accessor), size, stride, base, sparse })
+    }
+
+    /// Elements that are not an accessor's own but were decoded to `values`, tightly packed. Of the accessor only
+    /// `normalized` counts.
+    pub fn packed(
+        document: &Document,
+        accessor: &Accessor,
+        (kind, component): (Type, ComponentType),
+        values: &'a [u8],
+        shape: &Shape,
+        place: &str,
+    ) -> Result<Self> {
+        shape.check(document, kind, component, place)?;
+        let size = component.size() * kind.multiplicity();
+        let normalized = is_normalized(document, accessor);
+        Ok(Elements {
+            count: values.len() / size,
+            component,
+            normalized,
+            size,
+            stride: size,
+            base: Some(values),
+            sparse: None,
+        })
     }
 
     /// The bytes of element `i`; none for an element that was never given a value.
@@ -86,9 +120,12 @@ impl<'a> Elements<'a> {
         let Some(bytes) = self.bytes(i) else {
             return std::array::from_fn(|c| if c * self.component.size() < self.size { 0.0 } else { fill });
         };
+        let scaled = |value: f32, largest: f32| if self.normalized { (value / largest).max(-1.0) } else { value };
         std::array::from_fn(|c| match (self.component, bytes.get(c * self.component.size()..).unwrap_or_default()) {
-            (U8, [a, ..]) => f32::from(*a) / 255.0,
-            (U16, [a, b, ..]) => f32::from(u16::from_le_bytes([*a, *b])) / 65_535.0,
+            (I8, [a, ..]) => scaled(f32::from(*a as i8), 127.0),
+            (U8, [a, ..]) => scaled(f32::from(*a), 255.0),
+            (I16, [a, b, ..]) => scaled(f32::from(i16::from_le_bytes([*a, *b])), 32_767.0),
+            (U16, [a, b, ..]) => scaled(f32::from(u16::from_le_bytes([*a, *b])), 65_535.0),
             (F32, [a, b, c, d, ..]) => f32::from_le_bytes([*a, *b, *c, *d]),
             _ => fill,
         })
@@ -103,6 +140,26 @@ impl<'a> Elements<'a> {
             _ => 0,
         }
     }
+}
+
+impl Shape {
+    /// Refuses elements of another form.
+    fn check(&self, document: &Document, kind: Type, component: ComponentType, place: &str) -> Result<()> {
+        let quantized = if document.uses(QUANTIZATION) { self.quantized } else { &[] };
+        if self.types.contains(&kind) && (self.components.contains(&component) || quantized.contains(&component)) {
+            return Ok(());
+        }
+        let what = format!("elements are {kind:?} of {component:?}, not {:?} of {:?}", self.types, self.components);
+        Err(document.bad(place, what))
+    }
+}
+
+/// The extension that allows attributes to be integers.
+const QUANTIZATION: &str = "KHR_mesh_quantization";
+
+/// Without KHR_mesh_quantization all integer attributes are normalised, whatever an accessor says.
+fn is_normalized(document: &Document, accessor: &Accessor) -> bool {
+    accessor.normalized || !document.uses(QUANTIZATION)
 }
 
 /// The bytes from the first element on, and the stride, with every element inside its buffer view.
@@ -163,7 +220,8 @@ fn open_sparse<'a>(
     let bytes = view_of(indices.buffer_view.value(), indices.byte_offset.0, component.size(), "indices")?;
     let values = view_of(sparse.values.buffer_view.value(), sparse.values.byte_offset.0, size, "values")?;
     let tight = component.size();
-    let elements = Elements { count, component, size: tight, stride: tight, base: Some(bytes), sparse: None };
+    let elements =
+        Elements { count, component, normalized: false, size: tight, stride: tight, base: Some(bytes), sparse: None };
     let indices: Vec<u32> = (0..replaced as usize).map(|i| elements.index(i)).collect();
     let ascending = indices.windows(2).all(|pair| pair[0] < pair[1]);
     if !ascending || indices.last().is_some_and(|&last| last as usize >= count) {

@@ -1,8 +1,11 @@
 //! Buffers and buffer views.
 
 use super::container::Document;
+use super::decoders::MESHOPT;
 use super::{MAX_BUFFER_BYTES, Resolve, uri};
 use crate::error::Result;
+use gltf::json::buffer::View;
+use serde_json::Value;
 use std::borrow::Cow;
 use std::collections::HashMap;
 
@@ -10,8 +13,10 @@ use std::collections::HashMap;
 pub(super) struct Buffers<'a> {
     /// Each file and data URI once, and the BIN chunk.
     sources: Vec<Cow<'a, [u8]>>,
-    /// Index in `sources` and `byteLength` of each buffer.
-    buffers: Vec<(usize, u64)>,
+    /// Index in `sources` and `byteLength` of each buffer; none for one that only holds the place of decompressed data.
+    buffers: Vec<Option<(usize, u64)>>,
+    /// The decompressed bytes of each buffer view that is compressed.
+    decompressed: HashMap<usize, Vec<u8>>,
 }
 
 impl<'a> Buffers<'a> {
@@ -19,13 +24,24 @@ impl<'a> Buffers<'a> {
     pub fn load(document: &Document<'a>, resolve: Resolve) -> Result<Self> {
         let declared = document.root.buffers.iter().fold(0u64, |sum, buffer| sum.saturating_add(buffer.byte_length.0));
         document.within("its buffers", declared, MAX_BUFFER_BYTES, "bytes")?;
-        let mut loaded = Buffers { sources: Vec::new(), buffers: Vec::with_capacity(document.root.buffers.len()) };
+        let mut loaded = Buffers {
+            sources: Vec::new(),
+            buffers: Vec::with_capacity(document.root.buffers.len()),
+            decompressed: HashMap::new(),
+        };
         let mut known: HashMap<Option<&str>, usize> = HashMap::new();
         // A file may be longer than the buffer that names it.
         let mut fetched = 0u64;
         for (index, buffer) in document.root.buffers.iter().enumerate() {
             let place = format!("buffers[{index}]");
             let uri = buffer.uri.as_deref();
+            let extension = buffer.extensions.as_ref().and_then(|extensions| meshopt(&extensions.others));
+            let is_fallback = extension.is_some_and(|extension| extension["fallback"] == true);
+            let has_no_bytes = uri.is_none() && (index > 0 || document.binary.is_none());
+            if is_fallback || (has_no_bytes && MESHOPT.iter().any(|name| document.uses(name))) {
+                loaded.buffers.push(None);
+                continue;
+            }
             let source = match (known.get(&uri), uri, document.binary) {
                 (Some(&source), Some(_), _) => source,
                 (_, Some(uri), _) => {
@@ -44,9 +60,59 @@ impl<'a> Buffers<'a> {
                 let what = format!("it says {length} bytes, but there are {available}");
                 return Err(document.bad(format!("{place}.byteLength"), what));
             }
-            loaded.buffers.push((source, length));
+            loaded.buffers.push(Some((source, length)));
         }
+        loaded.decompress(document)?;
         Ok(loaded)
+    }
+
+    /// Decompresses the buffer views that EXT_meshopt_compression or KHR_meshopt_compression describe.
+    fn decompress(&mut self, document: &Document) -> Result<()> {
+        let mut total = 0u64;
+        for (index, view) in document.root.buffer_views.iter().enumerate() {
+            let extension = view.extensions.as_ref().and_then(|extensions| meshopt(&extensions.others));
+            let Some(extension) = extension else { continue };
+            let place = format!("bufferViews[{index}] (meshopt)");
+            total = total.saturating_add(view.byte_length.0);
+            document.within("its decompressed buffers", total, MAX_BUFFER_BYTES, "bytes")?;
+            let bytes = self.decompressed_view(document, view, extension, &place)?;
+            self.decompressed.insert(index, bytes);
+        }
+        Ok(())
+    }
+
+    /// One of them: as long as the view says.
+    fn decompressed_view(&self, document: &Document, view: &View, extension: &Value, place: &str) -> Result<Vec<u8>> {
+        let number = |name: &str, default: Option<u64>| {
+            let value = extension.get(name).map_or(default, Value::as_u64);
+            value.ok_or_else(|| document.bad(place, format!("its {name} is no whole number")))
+        };
+        let (buffer, offset) = (number("buffer", None)?, number("byteOffset", Some(0))?);
+        let (length, stride, count) =
+            (number("byteLength", None)?, number("byteStride", None)?, number("count", None)?);
+        if count.checked_mul(stride) != Some(view.byte_length.0) {
+            let what = format!("{count} elements of {stride} bytes are not the {} of the view", view.byte_length.0);
+            return Err(document.bad(place, what));
+        }
+        let buffer = usize::try_from(buffer).unwrap_or(usize::MAX);
+        let source = self.buffer(document, buffer, place)?;
+        let compressed = range(source, offset, length).ok_or_else(|| {
+            let what = format!("bytes {offset} + {length} lie outside the {} of its buffer", source.len());
+            document.bad(place, what)
+        })?;
+        let mode = extension.get("mode").and_then(Value::as_str).unwrap_or_default();
+        let filter = extension.get("filter").map_or("NONE", |filter| filter.as_str().unwrap_or_default());
+        // Both fit: their product is within the limit of all buffers.
+        let (count, stride) = (count as u32, stride as u32);
+        document.decode(place, |decoders| decoders.meshopt(compressed, mode, filter, count, stride))
+    }
+
+    /// The bytes of buffer `index`.
+    fn buffer(&self, document: &Document, index: usize, place: &str) -> Result<&[u8]> {
+        let Some((source, size)) = document.at(&self.buffers, index, "buffers", place)? else {
+            return Err(document.bad(place, format!("buffers[{index}] only stands for decompressed data")));
+        };
+        Ok(self.sources.get(*source).and_then(|bytes| range(bytes, 0, *size)).unwrap_or_default())
     }
 
     /// Keeps `bytes`; returns their index.
@@ -59,15 +125,23 @@ impl<'a> Buffers<'a> {
     pub fn view(&self, document: &Document, index: usize, place: &str) -> Result<(&[u8], Option<usize>)> {
         let view = document.at(&document.root.buffer_views, index, "bufferViews", place)?;
         let place = format!("bufferViews[{index}]");
-        let &(source, size) = document.at(&self.buffers, view.buffer.value(), "buffers", &place)?;
-        let buffer = self.sources.get(source).and_then(|bytes| range(bytes, 0, size)).unwrap_or_default();
+        let stride = view.byte_stride.map(|stride| stride.0);
+        if let Some(bytes) = self.decompressed.get(&index) {
+            return Ok((bytes, stride));
+        }
+        let buffer = self.buffer(document, view.buffer.value(), &place)?;
         let (offset, length) = (view.byte_offset.unwrap_or_default().0, view.byte_length.0);
         let bytes = range(buffer, offset, length).ok_or_else(|| {
             let what = format!("bytes {offset} + {length} lie outside the {} of its buffer", buffer.len());
             document.bad(&place, what)
         })?;
-        Ok((bytes, view.byte_stride.map(|stride| stride.0)))
+        Ok((bytes, stride))
     }
+}
+
+/// The extension of a compressed buffer or view.
+fn meshopt(extensions: &serde_json::Map<String, Value>) -> Option<&Value> {
+    MESHOPT.iter().find_map(|name| extensions.get(*name))
 }
 
 /// `length` bytes from `offset`, if they exist.

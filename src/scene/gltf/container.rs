@@ -1,6 +1,7 @@
 //! From bytes to typed JSON: the GLB container, the JSON itself, the version and the required extensions.
 
-use super::{SUPPORTED_EXTENSIONS, tidy};
+use super::decoders::{DECODED_EXTENSIONS, Decoders};
+use super::{Contents, Options, SUPPORTED_EXTENSIONS, tidy};
 use crate::error::{Error, Result};
 use gltf::json::{Root, validation::Checked};
 use serde_json::Value;
@@ -18,6 +19,14 @@ pub(super) struct Document<'a> {
     pub root: Root,
     /// The BIN chunk of a GLB.
     pub binary: Option<&'a [u8]>,
+    /// What can be chosen in the file.
+    pub contents: Contents,
+    /// Index of the chosen scene, if one was chosen.
+    pub scene: Option<usize>,
+    /// Index of the chosen variant, if one was chosen.
+    pub variant: Option<usize>,
+    /// What decodes compressed data; none where the file does not say that it has any.
+    pub decoders: Option<&'a dyn Decoders>,
 }
 
 impl Document<'_> {
@@ -48,6 +57,12 @@ impl Document<'_> {
             .ok_or_else(|| self.bad(place, format!("{kind}[{index}] does not exist: there are {}", list.len())))
     }
 
+    /// Whether the file says that it uses `extension`.
+    pub fn uses(&self, extension: &str) -> bool {
+        let root = &self.root;
+        root.extensions_used.iter().chain(&root.extensions_required).any(|name| name == extension)
+    }
+
     /// `values` if all are finite.
     pub fn finite<const N: usize>(&self, values: [f32; N], place: &str) -> Result<[f32; N]> {
         if values.iter().all(|value| value.is_finite()) {
@@ -57,11 +72,32 @@ impl Document<'_> {
     }
 }
 
-/// Splits, parses and checks version and extensions.
-pub(super) fn parse<'a>(file: &'a str, bytes: &'a [u8]) -> Result<Document<'a>> {
+/// The JSON, the BIN chunk if there is one, and the checked header.
+fn open<'a>(file: &str, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>, Header)> {
     let (json, binary) = if bytes.starts_with(b"glTF") { split_glb(file, bytes)? } else { (bytes, None) };
     check_json_size(file, json)?;
     let header = check_header(file, json)?;
+    Ok((json, binary, header))
+}
+
+/// What can be chosen in a file.
+pub(super) fn contents(file: &str, bytes: &[u8]) -> Result<Contents> {
+    open(file, bytes).map(|(_, _, header)| header.contents())
+}
+
+/// Splits, parses and checks version, extensions and what was chosen.
+pub(super) fn parse<'a>(file: &'a str, bytes: &'a [u8], options: &Options<'a>) -> Result<Document<'a>> {
+    let (json, binary, header) = open(file, bytes)?;
+    let contents = header.contents();
+    if let Some(scene) = options.scene.filter(|&scene| scene >= contents.scenes.len()) {
+        let what = format!("{file} has no scene {scene}: there are {}", contents.scenes.len());
+        return Err(Error::bad_value("scene-index", what));
+    }
+    let variant = options.variant.map(|name| {
+        let unknown = || Error::Unknown { kind: "variant", name: tidy(name), known: contents.variants.join(", ") };
+        contents.variants.iter().position(|known| known == name).ok_or_else(unknown)
+    });
+    let variant = variant.transpose()?;
     let root = if header.scenes.iter().all(|scene| scene.nodes.is_some()) {
         serde_json::from_slice(json).map_err(|error| json_error(file, &error))?
     } else {
@@ -71,7 +107,8 @@ pub(super) fn parse<'a>(file: &'a str, bytes: &'a [u8]) -> Result<Document<'a>> 
         // Lines and columns of that text are not the file's.
         serde_json::from_slice(&completed).map_err(|error| Error::bad_file(file, "JSON", json_fault(&error)))?
     };
-    Ok(Document { file, root, binary })
+    let decoders = options.decoders.filter(|_| contents.needs_decoders);
+    Ok(Document { file, root, binary, contents, scene: options.scene, variant, decoders })
 }
 
 /// Gives each scene its `nodes`, which the specification lets it leave out, but the JSON crate does not.
@@ -157,14 +194,57 @@ struct Header {
     asset: Asset,
     #[serde(default, rename = "extensionsRequired")]
     extensions_required: Vec<String>,
+    #[serde(default, rename = "extensionsUsed")]
+    extensions_used: Vec<String>,
+    #[serde(default)]
+    scene: usize,
     #[serde(default)]
     scenes: Vec<SceneHeader>,
+    #[serde(default)]
+    extensions: Extensions,
 }
 
 /// One of `scenes` of [`Header`].
 #[derive(serde::Deserialize)]
 struct SceneHeader {
     nodes: Option<serde::de::IgnoredAny>,
+    name: Option<String>,
+}
+
+/// `extensions` of [`Header`].
+#[derive(Default, serde::Deserialize)]
+struct Extensions {
+    #[serde(default, rename = "KHR_materials_variants")]
+    variants: Variants,
+}
+
+/// KHR_materials_variants of [`Extensions`].
+#[derive(Default, serde::Deserialize)]
+struct Variants {
+    #[serde(default)]
+    variants: Vec<Variant>,
+}
+
+/// One of [`Variants`].
+#[derive(serde::Deserialize)]
+struct Variant {
+    name: String,
+}
+
+impl Header {
+    /// What can be chosen. Text is made fit for a line; a variant is asked for by that.
+    fn contents(&self) -> Contents {
+        let used = self.extensions_used.iter().chain(&self.extensions_required);
+        let name = |(index, scene): (usize, &SceneHeader)| {
+            scene.name.as_deref().map_or_else(|| format!("scene {index}"), tidy)
+        };
+        Contents {
+            scenes: self.scenes.iter().enumerate().map(name).collect(),
+            scene: self.scene,
+            variants: self.extensions.variants.variants.iter().map(|variant| tidy(&variant.name)).collect(),
+            needs_decoders: used.into_iter().any(|name| DECODED_EXTENSIONS.contains(&name.as_str())),
+        }
+    }
 }
 
 /// `asset` of [`Header`].

@@ -1,7 +1,8 @@
-//! PNG and JPEG images, decoded to RGBA8.
+//! Images, decoded to RGBA8: PNG and JPEG, and by their extensions WebP and KTX2.
 
 use super::buffers::Buffers;
 use super::container::Document;
+use super::decoders::{BASISU, Limits as PictureLimits, WEBP};
 use super::{MAX_IMAGE_BYTES, MAX_IMAGE_SIDE, Resolve, tidy, uri};
 use crate::error::{Error, Result};
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
@@ -75,6 +76,9 @@ impl Images {
     /// Decodes `file`, whose format is told by its first bytes. The header's size is checked before anything is
     /// allocated for it.
     fn decode(&mut self, document: &Document, file: &[u8], place: &str) -> Result<Image> {
+        if file.starts_with(b"\xabKTX 20\xbb") || file.get(8..12) == Some(b"WEBP") {
+            return self.decode_picture(document, file, place);
+        }
         let broken = |error: image::ImageError| document.bad(place, tidy(&error.to_string()));
         let format = match image::guess_format(file) {
             Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) => format,
@@ -82,7 +86,7 @@ impl Images {
                 let what = format!("image format {other:?} ({place})");
                 return Err(Error::Unsupported { file: document.file.into(), what });
             }
-            Err(_) => return Err(document.bad(place, "it is neither PNG nor JPEG")),
+            Err(_) => return Err(document.bad(place, "it is neither PNG, JPEG, WebP nor KTX2")),
         };
         let mut limits = Limits::default();
         limits.max_image_width = Some(MAX_IMAGE_SIDE);
@@ -105,4 +109,29 @@ impl Images {
         let pixels = DynamicImage::from_decoder(decoder).map_err(broken)?.into_rgba8().into_raw();
         Ok(Image { width, height, pixels: Arc::new(pixels) })
     }
+
+    /// Decodes a WebP or KTX2 file.
+    fn decode_picture(&mut self, document: &Document, file: &[u8], place: &str) -> Result<Image> {
+        let left = (MAX_IMAGE_BYTES - self.bytes.min(MAX_IMAGE_BYTES)).min(MAX_DECODER_BYTES);
+        let limits = PictureLimits { side: MAX_IMAGE_SIDE, bytes: left };
+        let picture = document.decode(place, |decoders| decoders.picture(file, limits))?;
+        self.bytes += picture.pixels.len() as u64;
+        Ok(Image { width: picture.width, height: picture.height, pixels: Arc::new(picture.pixels) })
+    }
+}
+
+/// The image that a texture shows: that of KHR_texture_basisu, else that of EXT_texture_webp, else its own.
+pub(super) fn source(document: &Document, texture: &gltf::json::Texture, place: &str) -> Result<usize> {
+    let extensions = texture.extensions.as_ref().map(|extensions| &extensions.others);
+    for name in [BASISU, WEBP] {
+        let Some(extension) = extensions.and_then(|extensions| extensions.get(name)) else { continue };
+        let source = extension.get("source").and_then(serde_json::Value::as_u64);
+        let source = source.and_then(|source| usize::try_from(source).ok());
+        return source.ok_or_else(|| document.bad(format!("{place}.extensions.{name}.source"), "it is no index"));
+    }
+    // The JSON crate's mark for an absent source.
+    if texture.source.value() == u32::MAX as usize {
+        return Err(document.bad(place, "it has no source that this loader reads"));
+    }
+    Ok(texture.source.value())
 }

@@ -2,7 +2,7 @@
 
 use super::buffers::Buffers;
 use super::container::Document;
-use super::images::Images;
+use super::images::{self, Images};
 use super::{Resolve, material_extensions, tidy};
 use crate::error::Result;
 use crate::scene::{AlphaMode, Material, Scene, Texture, TextureRef, Wrap};
@@ -11,8 +11,9 @@ use gltf::json;
 use json::extensions::texture::TextureTransform;
 use json::texture::{MagFilter, WrappingMode};
 
-/// Loads every material of the file and the textures they use into `scene`, in file order.
-pub(super) fn load(document: &Document, buffers: &Buffers, resolve: Resolve, scene: &mut Scene) -> Result<()> {
+/// Loads every material of the file and the textures they use into `scene`, in file order. Returns the UV sets that each
+/// of them reads.
+pub(super) fn load(document: &Document, buffers: &Buffers, resolve: Resolve, scene: &mut Scene) -> Result<Vec<UvSets>> {
     let mut loader = Loader {
         document,
         buffers,
@@ -21,13 +22,37 @@ pub(super) fn load(document: &Document, buffers: &Buffers, resolve: Resolve, sce
         loaded: vec![None; document.root.textures.len()],
         textures: Vec::new(),
         warnings: Vec::new(),
+        uv_sets: UvSets::default(),
     };
+    let mut uv_sets = Vec::with_capacity(document.root.materials.len());
     for (index, material) in document.root.materials.iter().enumerate() {
         scene.materials.push(loader.material(material, &format!("materials[{index}]"))?);
+        uv_sets.push(std::mem::take(&mut loader.uv_sets));
     }
     scene.textures = loader.textures;
     scene.warnings.append(&mut loader.warnings);
-    Ok(())
+    Ok(uv_sets)
+}
+
+/// Which TEXCOORD sets of a file the two UV sets of a mesh are, for one material.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct UvSets([Option<u32>; 2]);
+
+impl UvSets {
+    /// The TEXCOORD set that is loaded as UV set `slot`.
+    pub fn source(self, slot: u32) -> u32 {
+        self.0.get(slot as usize).copied().flatten().unwrap_or(slot)
+    }
+
+    /// The UV set that becomes TEXCOORD set `source`: 0 and 1 keep their places where these are free. None where two
+    /// others are taken.
+    fn slot(&mut self, source: u32) -> Option<u32> {
+        let preferred = if source == 0 { [0, 1] } else { [1, 0] };
+        let taken = preferred.into_iter().find(|&slot| self.0[slot] == Some(source));
+        let slot = taken.or_else(|| preferred.into_iter().find(|&slot| self.0[slot].is_none()))?;
+        self.0[slot] = Some(source);
+        Some(slot as u32)
+    }
 }
 
 /// What materials share while they are loaded.
@@ -40,6 +65,8 @@ pub(super) struct Loader<'a> {
     loaded: Vec<Option<u32>>,
     textures: Vec<Texture>,
     warnings: Vec<String>,
+    /// Of the material being loaded.
+    uv_sets: UvSets,
 }
 
 /// The three kinds of textureInfo as one.
@@ -150,14 +177,17 @@ impl Loader<'_> {
         info.as_ref().map_or(Ok(None), |info| self.texture_ref(info.into(), place))
     }
 
-    /// How a material reads a texture, or none (with a warning) where it wants a third UV set.
+    /// How a material reads a texture, or none (with a warning) where it wants a third UV set besides two others.
     fn texture_ref(&mut self, info: TextureInfo, place: &str) -> Result<Option<TextureRef>> {
         let transform = info.transform.unwrap_or_default();
-        let uv_set = transform.tex_coord.unwrap_or(info.tex_coord);
-        if uv_set > 1 {
-            self.warnings.push(format!("{place} is ignored: it reads TEXCOORD_{uv_set}, and only 0 and 1 are loaded"));
+        let source = transform.tex_coord.unwrap_or(info.tex_coord);
+        let Some(uv_set) = self.uv_sets.slot(source) else {
+            let [first, second] = [0, 1].map(|slot| self.uv_sets.source(slot));
+            self.warnings.push(format!(
+                "{place} is ignored: it reads TEXCOORD_{source} besides {first} and {second}; a mesh keeps two UV sets"
+            ));
             return Ok(None);
-        }
+        };
         let ([ox, oy], [sx, sy]) = (transform.offset.0, transform.scale.0);
         let transform_place = format!("{place}.extensions.KHR_texture_transform");
         let [ox, oy, sx, sy, rotation] =
@@ -174,12 +204,9 @@ impl Loader<'_> {
             return Ok(*loaded);
         }
         let place = format!("textures[{index}]");
-        // The JSON crate's mark for an absent source.
-        if texture.source.value() == u32::MAX as usize {
-            return Err(document.bad(place, "it has no source that this loader reads"));
-        }
-        let source = format!("{place}.source");
-        let image = self.images.get(document, self.buffers, self.resolve, texture.source.value(), &source)?;
+        let source = images::source(document, texture, &place)?;
+        let source_place = format!("{place}.source");
+        let image = self.images.get(document, self.buffers, self.resolve, source, &source_place)?;
         let (wrap, linear_filter) = match texture.sampler {
             Some(sampler) => self.sampler(sampler.value(), &format!("{place}.sampler"))?,
             None => ([Wrap::Repeat; 2], true),

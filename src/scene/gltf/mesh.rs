@@ -3,7 +3,9 @@
 use super::accessor::{self, Elements, Shape};
 use super::buffers::Buffers;
 use super::container::Document;
-use super::{MAX_GEOMETRY_BYTES, topology};
+use super::draco::Draco;
+use super::material::UvSets;
+use super::{MAX_GEOMETRY_BYTES, topology, variants};
 use crate::error::Result;
 use crate::scene::{Material, Mesh, Scene, TextureRef, tangents};
 use glam::{Vec2, Vec3, Vec4};
@@ -24,12 +26,18 @@ impl Budget {
         self.bytes = self.bytes.saturating_add(bytes);
         document.within("its geometry", self.bytes, MAX_GEOMETRY_BYTES, "bytes")
     }
+
+    /// Bytes that may still be charged.
+    pub fn left(&self) -> u64 {
+        MAX_GEOMETRY_BYTES.saturating_sub(self.bytes)
+    }
 }
 
 /// Loads glTF mesh `index` into `scene`: one mesh a primitive that has triangles. Returns their indices.
 pub(super) fn load(
     document: &Document,
     buffers: &Buffers,
+    uv_sets: &[UvSets],
     budget: &mut Budget,
     index: usize,
     scene: &mut Scene,
@@ -40,9 +48,11 @@ pub(super) fn load(
         let place = format!("meshes[{index}].primitives[{position}]");
         let material = material_index(document, source, &place, scene)?;
         let tangents_for = tangents_for(scene.materials.get(material as usize));
-        let reader = Reader { document, buffers, source, place: &place, tangents_for };
+        let uv_sets = uv_sets.get(material as usize).copied().unwrap_or_default();
+        let draco = Draco::load(document, buffers, budget, source, &place)?;
+        let reader = Reader { document, buffers, source, place: &place, tangents_for, uv_sets, draco };
         if let Some(mesh) = reader.read(budget, &mut scene.warnings)? {
-            warn_of_missing_uvs(&mesh, scene.materials.get(material as usize), &place, &mut scene.warnings);
+            warn_of_missing_uvs(&mesh, scene.materials.get(material as usize), uv_sets, &place, &mut scene.warnings);
             loaded.push(scene.meshes.len() as u32);
             scene.meshes.push(Mesh { material, ..mesh });
         }
@@ -53,6 +63,9 @@ pub(super) fn load(
 /// The primitive's material; the specification's default one is appended where it is needed.
 fn material_index(document: &Document, source: &Primitive, place: &str, scene: &mut Scene) -> Result<u32> {
     let materials = &document.root.materials;
+    if let Some(material) = variants::material(document, source, place)? {
+        return Ok(material as u32);
+    }
     if let Some(material) = source.material {
         document.at(materials, material.value(), "materials", &format!("{place}.material"))?;
         return Ok(material.value() as u32);
@@ -64,11 +77,18 @@ fn material_index(document: &Document, source: &Primitive, place: &str, scene: &
 }
 
 /// Says which textures will be read at (0, 0).
-fn warn_of_missing_uvs(mesh: &Mesh, material: Option<&Material>, place: &str, warnings: &mut Vec<String>) {
+fn warn_of_missing_uvs(
+    mesh: &Mesh,
+    material: Option<&Material>,
+    uv_sets: UvSets,
+    place: &str,
+    warnings: &mut Vec<String>,
+) {
     let Some(m) = material else { return };
     for (set, uvs) in mesh.uvs.iter().enumerate() {
         if uvs.is_empty() && m.textures().any(|texture| texture.uv_set as usize == set) {
-            warnings.push(format!("{place}: its material reads TEXCOORD_{set}, which it lacks: (0, 0) is used"));
+            let source = uv_sets.source(set as u32);
+            warnings.push(format!("{place}: its material reads TEXCOORD_{source}, which it lacks: (0, 0) is used"));
         }
     }
 }
@@ -89,21 +109,25 @@ struct Reader<'a> {
     place: &'a str,
     /// What tangents would be for.
     tangents_for: Option<TextureRef>,
+    /// Those that the material reads.
+    uv_sets: UvSets,
+    /// What stands in for the accessors of a compressed primitive.
+    draco: Option<Draco>,
 }
 
 impl Reader<'_> {
     /// The primitive's triangles, or none (with a warning) if it has none. Only vertices that triangles use are read.
     fn read(&self, budget: &mut Budget, warnings: &mut Vec<String>) -> Result<Option<Mesh>> {
-        let Some(positions) = self.attribute(budget, Semantic::Positions, &accessor::VEC3, None)? else {
+        let Some(positions) = self.attribute(budget, Semantic::Positions, &accessor::POSITION, None)? else {
             warnings.push(format!("{}: it has no POSITION and is left out", self.place));
             return Ok(None);
         };
         let count = Some(positions.count);
-        let normals = self.attribute(budget, Semantic::Normals, &accessor::VEC3, count)?;
-        let tangents = self.attribute(budget, Semantic::Tangents, &accessor::VEC4, count)?;
+        let normals = self.attribute(budget, Semantic::Normals, &accessor::NORMAL, count)?;
+        let tangents = self.attribute(budget, Semantic::Tangents, &accessor::TANGENT, count)?;
         let uvs = [
-            self.attribute(budget, Semantic::TexCoords(0), &accessor::TEXCOORD, count)?,
-            self.attribute(budget, Semantic::TexCoords(1), &accessor::TEXCOORD, count)?,
+            self.attribute(budget, Semantic::TexCoords(self.uv_sets.source(0)), &accessor::TEXCOORD, count)?,
+            self.attribute(budget, Semantic::TexCoords(self.uv_sets.source(1)), &accessor::TEXCOORD, count)?,
         ];
         let colors = self.attribute(budget, Semantic::Colors(0), &accessor::COLOR, count)?;
 
@@ -154,7 +178,13 @@ impl Reader<'_> {
         count: Option<usize>,
     ) -> Result<Option<Elements<'_>>> {
         let place = format!("{}.attributes.{}", self.place, semantic.to_string());
+        let draco = self.draco.as_ref().and_then(|draco| draco.attribute(&semantic.to_string()));
         let Some(index) = self.source.attributes.get(&Checked::Valid(semantic)) else { return Ok(None) };
+        if let Some(attribute) = draco {
+            let accessor = self.document.at(&self.document.root.accessors, index.value(), "accessors", &place)?;
+            let kind = attribute.kind(self.document, &place)?;
+            return Elements::packed(self.document, accessor, kind, attribute.values(), shape, &place).map(Some);
+        }
         let elements = Elements::open(self.document, self.buffers, budget, index.value(), shape, &place)?;
         match count {
             Some(count) if count != elements.count => {
@@ -169,6 +199,10 @@ impl Reader<'_> {
     fn triangles(&self, budget: &mut Budget, vertices: usize, warnings: &mut Vec<String>) -> Result<Option<Vec<u32>>> {
         let mode = self.document.valid(&self.source.mode, &format!("{}.mode", self.place))?;
         let place = format!("{}.indices", self.place);
+        if let Some(draco) = &self.draco {
+            // Checked by the decoder; a strip becomes a list by compression.
+            return Ok(Some(draco.indices().to_vec()).filter(|indices| !indices.is_empty()));
+        }
         let indices = match self.source.indices {
             Some(index) => {
                 Some(Elements::open(self.document, self.buffers, budget, index.value(), &accessor::INDEX, &place)?)

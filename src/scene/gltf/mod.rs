@@ -1,7 +1,7 @@
 //! The glTF 2.0 loader: a `.glb` or `.gltf` file becomes a [`Scene`].
 //!
-//! Source: the glTF 2.0 specification and the extensions named in [`SUPPORTED_EXTENSIONS`]. Only the default scene's
-//! nodes are loaded (scene 0 where no default is named, every root node where there are no scenes). Occlusion textures
+//! Source: the glTF 2.0 specification and the extensions named in [`SUPPORTED_EXTENSIONS`]. The nodes of one scene are
+//! loaded (the default one unless another is chosen; every root node where there are no scenes). Occlusion textures
 //! are ignored, for light transport is computed; animations, skins and morph targets are not played (a warning says so).
 //!
 //! Nothing in a file is trusted: every size, count, offset and index is checked before it is used or allocated for, so
@@ -12,7 +12,10 @@ mod area_lights;
 mod buffers;
 mod camera;
 mod container;
+mod decoders;
+mod draco;
 mod images;
+mod instancing;
 mod lights;
 mod material;
 mod material_extensions;
@@ -20,6 +23,13 @@ mod mesh;
 mod nodes;
 mod topology;
 mod uri;
+mod variants;
+
+#[cfg(not(target_arch = "wasm32"))]
+pub use decoders::Linked;
+pub use decoders::{DECODED_EXTENSIONS, Decoders, DracoMesh, Fault, Limits, Picture};
+#[cfg(not(target_arch = "wasm32"))]
+pub(super) use uri::relative_path;
 
 use super::Scene;
 use crate::error::Result;
@@ -27,6 +37,10 @@ use container::Document;
 
 /// Extensions that a file may require.
 pub const SUPPORTED_EXTENSIONS: &[&str] = &[
+    "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -38,7 +52,11 @@ pub const SUPPORTED_EXTENSIONS: &[&str] = &[
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
+    "KHR_materials_variants",
     "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "KHR_texture_basisu",
     "KHR_texture_transform",
 ];
 
@@ -58,17 +76,67 @@ const MAX_WARNINGS: usize = 100;
 /// Reads an external resource: it is given a relative path (percent-decoded, `/`-separated, without `..`).
 pub type Resolve<'r> = &'r mut dyn FnMut(&str) -> Result<Vec<u8>>;
 
+/// What a person chooses in a file, and what decodes it.
+#[derive(Clone, Copy)]
+pub struct Options<'a> {
+    /// Index of the scene to load instead of the file's default.
+    pub scene: Option<usize>,
+    /// Name of the variant (`KHR_materials_variants`) whose materials are used; as [`Contents::variants`] has it.
+    pub variant: Option<&'a str>,
+    /// Decodes what [`DECODED_EXTENSIONS`] compress.
+    pub decoders: Option<&'a dyn Decoders>,
+}
+
+impl Default for Options<'_> {
+    /// The file's default scene and materials; the decoders that are linked in, if any are.
+    fn default() -> Self {
+        #[cfg(not(target_arch = "wasm32"))]
+        let decoders: Option<&dyn Decoders> = Some(&Linked);
+        #[cfg(target_arch = "wasm32")]
+        let decoders: Option<&dyn Decoders> = None;
+        Options { scene: None, variant: None, decoders }
+    }
+}
+
+/// What can be chosen in a file, and whether it has something to decode.
+#[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Contents {
+    /// Names of the scenes, in file order.
+    pub scenes: Vec<String>,
+    /// Index of the default scene.
+    pub scene: usize,
+    /// Names of the material variants.
+    pub variants: Vec<String>,
+    /// Whether it uses one of [`DECODED_EXTENSIONS`].
+    pub needs_decoders: bool,
+}
+
+/// Looks into a file without loading it.
+///
+/// # Errors
+/// As [`load_bytes`], for the file's container, version and required extensions.
+pub fn contents(name: &str, bytes: &[u8]) -> Result<Contents> {
+    container::contents(name, bytes)
+}
+
+/// As [`contents`], of a file on disk.
+///
+/// # Errors
+/// [`Error::Io`](crate::Error::Io) where it cannot be read, else as [`contents`].
+#[cfg(not(target_arch = "wasm32"))]
+pub fn contents_of_file(path: &std::path::Path) -> Result<Contents> {
+    contents(&path.display().to_string(), &crate::scene::files::read(path, MAX_BUFFER_BYTES)?)
+}
+
 /// Loads a `.glb` or `.gltf` file; external buffers and images are read from beside it.
 ///
 /// # Errors
-/// [`Error::Io`](crate::Error::Io) where a file cannot be read, else as [`load_bytes`].
+/// [`Error::Io`](crate::Error::Io) where a file cannot be read, else as [`load_bytes_with`].
 #[cfg(not(target_arch = "wasm32"))]
-pub fn load_file(path: &std::path::Path) -> Result<Scene> {
-    let folder = path.parent().unwrap_or(std::path::Path::new(""));
+pub fn load_file(path: &std::path::Path, options: &Options) -> Result<Scene> {
     let bytes = crate::scene::files::read(path, MAX_BUFFER_BYTES)?;
-    load_bytes(&path.display().to_string(), &bytes, &mut |relative| {
-        crate::scene::files::read(&folder.join(relative), MAX_BUFFER_BYTES)
-    })
+    let mut resolve = crate::scene::files::beside(path, MAX_BUFFER_BYTES);
+    load_bytes_with(&path.display().to_string(), &bytes, options, &mut resolve)
 }
 
 /// Loads glTF from memory; `name` is used in errors and, without folder and suffix, as the scene's name. Binary glTF is
@@ -80,12 +148,21 @@ pub fn load_file(path: &std::path::Path) -> Result<Scene> {
 /// [`Error::Unsupported`](crate::Error::Unsupported) for a required extension or a format this loader lacks,
 /// [`Error::Limit`](crate::Error::Limit) for a file beyond one of this module's limits, and what `resolve` returns.
 pub fn load_bytes(name: &str, bytes: &[u8], resolve: Resolve) -> Result<Scene> {
-    let document = container::parse(name, bytes)?;
+    load_bytes_with(name, bytes, &Options::default(), resolve)
+}
+
+/// As [`load_bytes`], with a scene, a variant and decoders of the caller's choice.
+///
+/// # Errors
+/// As [`load_bytes`]; [`Error::BadValue`](crate::Error::BadValue) and [`Error::Unknown`](crate::Error::Unknown) for a
+/// scene or variant that the file does not have.
+pub fn load_bytes_with(name: &str, bytes: &[u8], options: &Options, resolve: Resolve) -> Result<Scene> {
+    let document = container::parse(name, bytes, options)?;
     let buffers = buffers::Buffers::load(&document, resolve)?;
     let mut scene = Scene { name: scene_name(name), ..Scene::default() };
     warn_of_unplayed(&document, &mut scene.warnings);
-    material::load(&document, &buffers, resolve, &mut scene)?;
-    nodes::load(&document, &buffers, &mut scene)?;
+    let uv_sets = material::load(&document, &buffers, resolve, &mut scene)?;
+    nodes::load(&document, &buffers, &uv_sets, &mut scene)?;
     if scene.meshes.is_empty() {
         scene.warnings.push("the scene has no triangles".into());
     }

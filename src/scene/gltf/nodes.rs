@@ -2,19 +2,22 @@
 
 use super::buffers::Buffers;
 use super::container::Document;
+use super::material::UvSets;
 use super::mesh::{self, Budget};
-use super::{MAX_INSTANCES, area_lights, camera, lights};
+use super::{MAX_INSTANCES, area_lights, camera, instancing, lights};
 use crate::error::Result;
 use crate::scene::{Camera, Instance, MAX_TRIANGLES, Scene};
 use glam::{Mat4, Quat, Vec3, Vec4};
 use gltf::json::Node;
 
-/// Walks the default scene's nodes in file order and loads the meshes, lights and cameras they place into `scene`.
-pub(super) fn load(document: &Document, buffers: &Buffers, scene: &mut Scene) -> Result<()> {
+/// Walks the chosen scene's nodes in file order and loads the meshes, lights and cameras they place into `scene`.
+/// `uv_sets` are those of each material.
+pub(super) fn load(document: &Document, buffers: &Buffers, uv_sets: &[UvSets], scene: &mut Scene) -> Result<()> {
     let roots = check_hierarchy(document)?;
     let mut loader = Loader {
         document,
         buffers,
+        uv_sets,
         scene,
         budget: Budget::default(),
         meshes: vec![None; document.root.meshes.len()],
@@ -36,7 +39,7 @@ pub(super) fn load(document: &Document, buffers: &Buffers, scene: &mut Scene) ->
     Ok(())
 }
 
-/// The roots of the default scene, once every node is known to have at most one parent and no cycle.
+/// The roots of the chosen scene, once every node is known to have at most one parent and no cycle.
 fn check_hierarchy(document: &Document) -> Result<Vec<usize>> {
     let nodes = &document.root.nodes;
     let mut parents: Vec<Option<usize>> = vec![None; nodes.len()];
@@ -67,9 +70,10 @@ fn check_hierarchy(document: &Document) -> Result<Vec<usize>> {
     roots(document, &parents)
 }
 
-/// The nodes of the default scene (scene 0 if none is named; every root node if there are no scenes).
+/// The nodes of the chosen scene (the default one if none is chosen, scene 0 if none is named; every root node if there
+/// are no scenes).
 fn roots(document: &Document, parents: &[Option<usize>]) -> Result<Vec<usize>> {
-    let index = document.root.scene.map_or(0, |scene| scene.value());
+    let index = document.scene.unwrap_or_else(|| document.root.scene.map_or(0, |scene| scene.value()));
     if document.root.scenes.is_empty() && document.root.scene.is_none() {
         return Ok((0..parents.len()).filter(|&node| parents[node].is_none()).collect());
     }
@@ -93,6 +97,7 @@ fn roots(document: &Document, parents: &[Option<usize>]) -> Result<Vec<usize>> {
 struct Loader<'a> {
     document: &'a Document<'a>,
     buffers: &'a Buffers<'a>,
+    uv_sets: &'a [UvSets],
     scene: &'a mut Scene,
     budget: Budget,
     /// For each glTF mesh loaded so far, the meshes its primitives became.
@@ -110,7 +115,14 @@ impl Loader<'_> {
         let to_world = parent * local_transform(self.document, node, &place)?;
         self.document.finite(to_world.to_cols_array(), &format!("{place} (its transform to world space)"))?;
         if let Some(mesh) = node.mesh {
-            self.instances(mesh.value(), to_world, &place)?;
+            match instancing::load(self.document, self.buffers, &mut self.budget, node, &place)? {
+                Some(transforms) => {
+                    for transform in transforms {
+                        self.instances(mesh.value(), to_world * transform, &place)?;
+                    }
+                }
+                None => self.instances(mesh.value(), to_world, &place)?,
+            }
         }
         let light = node.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref());
         if let Some(light) = light {
@@ -138,7 +150,7 @@ impl Loader<'_> {
         self.document.at(&self.document.root.meshes, index, "meshes", &format!("{place}.mesh"))?;
         let Some(slot) = self.meshes.get_mut(index) else { return Ok(()) };
         if slot.is_none() {
-            *slot = Some(mesh::load(self.document, self.buffers, &mut self.budget, index, self.scene)?);
+            *slot = Some(mesh::load(self.document, self.buffers, self.uv_sets, &mut self.budget, index, self.scene)?);
         }
         for &mesh in slot.iter().flatten() {
             let triangles = self.scene.meshes.get(mesh as usize).map_or(0, |mesh| mesh.indices.len() / 3);

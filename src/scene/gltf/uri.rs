@@ -70,7 +70,7 @@ fn percent_decode(text: &str) -> std::result::Result<Vec<u8>, String> {
 }
 
 /// The percent-decoded, normalised path, if it stays in the folder of the file that names it.
-fn relative_path(uri: &str) -> std::result::Result<String, String> {
+pub fn relative_path(uri: &str) -> std::result::Result<String, String> {
     let path = String::from_utf8(percent_decode(uri)?).map_err(|_| "is not UTF-8")?;
     if path.contains(|c: char| c.is_control() || c == '\\') {
         return Err("has a backslash or a control character".into());

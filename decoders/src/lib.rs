@@ -1,0 +1,32 @@
+//! The decoders that only some files need: Draco and meshopt geometry, Basis Universal and WebP pictures, Wavefront OBJ.
+//!
+//! Native programs link them. The page keeps them in a wasm module of their own, which its Worker fetches when a file
+//! asks for one, so that nobody else downloads them.
+//!
+//! Nothing in a file is trusted: what a decoder may produce is bounded by the caller, and checked before it is allocated.
+
+pub mod draco;
+mod ktx2;
+pub mod meshopt;
+#[cfg(all(target_arch = "wasm32", feature = "module"))]
+mod module;
+pub mod obj;
+pub mod picture;
+mod words;
+
+/// Why something was not decoded: one line for a person, without the name of the file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Fault {
+    /// The bytes are broken, or decode to more than the caller allows.
+    Broken(String),
+    /// They are sound but of a kind that is not decoded.
+    Unsupported(String),
+}
+
+/// What every decoder returns.
+pub type Result<T> = std::result::Result<T, Fault>;
+
+/// A [`Fault::Broken`].
+fn broken(what: impl Into<String>) -> Fault {
+    Fault::Broken(what.into())
+}

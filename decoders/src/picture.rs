@@ -1,0 +1,86 @@
+//! Pictures: WebP here, KTX2 in [`ktx2`].
+
+use crate::words::u32_at;
+use crate::{Result, broken, ktx2};
+use std::io::Cursor;
+
+/// A decoded picture.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    /// Width in texels, at least 1.
+    pub width: u32,
+    /// Height in texels, at least 1.
+    pub height: u32,
+    /// RGBA8, row-major from the top, as stored.
+    pub pixels: Vec<u8>,
+}
+
+/// What a decoded picture may be.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// Longest side in texels.
+    pub side: u32,
+    /// Most bytes as RGBA8.
+    pub bytes: u64,
+}
+
+/// Decodes a WebP or KTX2 file, told apart by their first bytes; only the largest level of a KTX2 is read. The size is
+/// checked before anything is allocated for it.
+///
+/// # Errors
+/// [`Fault::Broken`](crate::Fault::Broken) for a broken file or one beyond `limits`;
+/// [`Fault::Unsupported`](crate::Fault::Unsupported) for other kinds of picture.
+pub fn decode(bytes: &[u8], limits: Limits) -> Result<Picture> {
+    if bytes.starts_with(&ktx2::IDENTIFIER) {
+        return ktx2::decode(bytes, limits);
+    }
+    if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
+        return decode_webp(bytes, limits);
+    }
+    Err(broken("it is neither WebP nor KTX2"))
+}
+
+/// Refuses sizes that are 0 or too large.
+pub(crate) fn check_size(width: u32, height: u32, limits: Limits) -> Result<()> {
+    let bytes = u64::from(width) * u64::from(height) * 4;
+    if width == 0 || height == 0 || width.max(height) > limits.side || bytes > limits.bytes {
+        let Limits { side, bytes } = limits;
+        return Err(broken(format!("{width} x {height} texels; at most {side} a side and {bytes} bytes are decoded")));
+    }
+    Ok(())
+}
+
+/// A WebP file, or the first picture of an animated one.
+fn decode_webp(bytes: &[u8], limits: Limits) -> Result<Picture> {
+    let error = |error: image_webp::DecodingError| broken(format!("WebP: {error}"));
+    let mut decoder = image_webp::WebPDecoder::new(Cursor::new(bytes)).map_err(error)?;
+    let (width, height) = decoder.dimensions();
+    check_size(width, height, limits)?;
+    decoder.set_memory_limit(usize::try_from(limits.bytes).unwrap_or(usize::MAX));
+    let size = decoder.output_buffer_size().ok_or_else(|| broken("WebP: too large"))?;
+    let mut pixels = vec![0; size];
+    decoder.read_image(&mut pixels).map_err(error)?;
+    if !decoder.has_alpha() {
+        pixels = pixels.as_chunks::<3>().0.iter().flat_map(|&[r, g, b]| [r, g, b, 255]).collect();
+    }
+    Ok(Picture { width, height, pixels })
+}
+
+impl Picture {
+    /// The picture as bytes that [`Picture::from_bytes`] reads: pixels, width, height.
+    pub fn into_bytes(self) -> Vec<u8> {
+        let mut out = self.pixels;
+        out.extend(self.width.to_le_bytes());
+        out.extend(self.height.to_le_bytes());
+        out
+    }
+
+    /// What [`Picture::into_bytes`] wrote, or none.
+    pub fn from_bytes(mut bytes: Vec<u8>) -> Option<Picture> {
+        let end = bytes.len().checked_sub(8)?;
+        let (width, height) = (u32_at(&bytes, end)?, u32_at(&bytes, end + 4)?);
+        bytes.truncate(end);
+        let size = u64::from(width) * u64::from(height) * 4;
+        (size == bytes.len() as u64).then_some(Picture { width, height, pixels: bytes })
+    }
+}
