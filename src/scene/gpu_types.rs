@@ -205,8 +205,8 @@ impl TextureSlot {
     /// Packs a slot. Numbers that do not fit lose their high bits.
     pub fn new(row_u: Vec3, row_v: Vec3, read: &TextureRead) -> Self {
         let TextureRead { array, layer, origin: [x, y], size: [width, height], wrap: [wrap_u, wrap_v], .. } = *read;
-        let place = (x / 8 & 0x3ff)
-            | (y / 8 & 0x3ff) << 10
+        let place = ((x / 8) & 0x3ff)
+            | ((y / 8) & 0x3ff) << 10
             | (layer & 0xff) << 20
             | (array & 3) << 28
             | (read.uv_set & 1) << 30

@@ -72,8 +72,11 @@ impl Document<'_> {
     }
 }
 
+/// The JSON chunk, the binary chunk if there is one, and what the JSON begins with.
+type Opened<'a> = (&'a [u8], Option<&'a [u8]>, Header);
+
 /// The JSON, the BIN chunk if there is one, and the checked header.
-fn open<'a>(file: &str, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>, Header)> {
+fn open<'a>(file: &str, bytes: &'a [u8]) -> Result<Opened<'a>> {
     let (json, binary) = if bytes.starts_with(b"glTF") { split_glb(file, bytes)? } else { (bytes, None) };
     check_json_size(file, json)?;
     let header = check_header(file, json)?;
