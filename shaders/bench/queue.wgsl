@@ -11,7 +11,7 @@ var<workgroup> queue_next: atomic<u32>;
 
 fn queue_start(index: u32) -> Walk {
     let ray = bench_rays[index];
-    return walk_start(ray.origin + ray.t_min * ray.direction, ray.direction, ray.t_max - ray.t_min);
+    return walk_start(frame.top_level, ray.origin + ray.t_min * ray.direction, ray.direction, ray.t_max - ray.t_min);
 }
 
 @compute @workgroup_size(LANES)

@@ -236,9 +236,10 @@ struct Walk {
     hit: Hit,
 }
 
-fn walk_start(origin: vec3f, direction: vec3f, t_max: f32) -> Walk {
+// `top_level` is the scene's root, that of this frame or of the previous one.
+fn walk_start(top_level: u32, origin: vec3f, direction: vec3f, t_max: f32) -> Walk {
     rays_traced += 1u;
-    let next = select(0u, frame.top_level, scene_has_instances);
+    let next = select(0u, top_level, scene_has_instances);
     let instance = select(0u, NONE, scene_has_instances);
     let hit = Hit(t_max, NONE, vec2f(0.0), 0u);
     return Walk(origin, next, direction, 0u, origin, instance, direction, safe_inverse(direction), hit);
@@ -265,7 +266,7 @@ fn walk_turn(walk: ptr<function, Walk>, stack: ptr<function, array<u32, BVH_STAC
             (*walk).inverse = safe_inverse((*walk).direction);
             (*stack)[depth] = LEAVE;
             depth += 1u;
-            next = instance_texel(item, 9u).x;
+            next = instance_texel(item, 6u).x;
         } else {
             let end = item + ((next >> 28u) & 7u) + 1u;
             for (var i = item; i < end; i += 1u) {
@@ -292,11 +293,16 @@ fn walk_turn(walk: ptr<function, Walk>, stack: ptr<function, array<u32, BVH_STAC
 
 // The closest hit with 0 < t < t_max, or, with `any_hit`, whichever is found first. Distances are the same in the space
 // of every mesh, for the ray's direction is not normalised on the way there.
-fn traverse(origin: vec3f, direction: vec3f, t_max: f32, any_hit: bool) -> Hit {
+fn traverse_from(top_level: u32, origin: vec3f, direction: vec3f, t_max: f32, any_hit: bool) -> Hit {
     var stack: array<u32, BVH_STACK>;
-    var walk = walk_start(origin, direction, t_max);
+    var walk = walk_start(top_level, origin, direction, t_max);
     while walk.next != DONE {
         walk_turn(&walk, &stack, any_hit);
     }
     return walk.hit;
+}
+
+// The same in this frame's scene.
+fn traverse(origin: vec3f, direction: vec3f, t_max: f32, any_hit: bool) -> Hit {
+    return traverse_from(frame.top_level, origin, direction, t_max, any_hit);
 }

@@ -110,7 +110,7 @@ pub fn run(args: &Args) -> Result<()> {
     report::warnings(&flat.warnings);
     let camera = match (args.eye, args.target) {
         (Some(eye), Some(target)) => Camera::look_at("given", eye, target, args.fov.to_radians()),
-        _ => scene::camera(&flat.cameras, args.camera.as_deref())?.clone(),
+        _ => flat.cameras[scene::camera(&flat.cameras, args.camera.as_deref())?].clone(),
     };
     let builds = Preset::ALL.map(|preset| build(&flat, preset));
 
