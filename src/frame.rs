@@ -50,10 +50,10 @@ pub struct Frame {
     pub sun_light: u32,
     /// 0 by ray cones, 1 always the finest.
     pub texture_levels: u32,
-    /// Unused.
-    pub padding_0: u32,
-    /// Unused.
-    pub padding_1: u32,
+    /// The same of the previous frame.
+    pub previous_top_level: u32,
+    /// Instances of the scene; their twins come after as many.
+    pub instance_count: u32,
 }
 }
 

@@ -1,5 +1,7 @@
 //! The uploaded scene: the buffers and textures of bind group 0, all but the frame uniform.
 
+mod motion;
+
 use crate::environment_pyramid::EnvironmentPyramid;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -7,16 +9,18 @@ use crate::gpu::data_texture::DataTexture;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
 use crate::pace::{Pace, SLICE_BYTES};
-use crate::scene::flat::{FlatEnvironment, FlatInstance, TextureArray, levels};
+use crate::scene::flat::{FlatEnvironment, TextureArray};
 use crate::scene::gpu_types::{
-    BvhNode, Instance, LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, MATERIAL_UNLIT, MATERIAL_VOLUME,
-    MaterialExtensions, NONE, TRIANGLE_ALPHA_MASK,
+    LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, MATERIAL_UNLIT, MATERIAL_VOLUME, MaterialExtensions, NONE,
+    TRIANGLE_ALPHA_MASK, Triangle,
 };
+use crate::scene::stage::Stage;
 use crate::scene::{FlatScene, Shape};
-use glam::{Mat4, Quat, UVec2, Vec3, Vec4};
+use glam::{UVec2, Vec3};
+use motion::Motion;
 
 /// Triangles in the first of the two buffers: 128 MiB, what every WebGPU device can bind. As in `shaders/scene/data.wgsl`.
-const FIRST_TRIANGLES: usize = (128 << 20) / size_of::<crate::scene::gpu_types::Triangle>();
+const FIRST_TRIANGLES: usize = (128 << 20) / size_of::<Triangle>();
 
 /// The texture arrays as shaders name them. A scene may have fewer.
 const TEXTURE_ARRAYS: [&str; 4] = ["textures_0", "textures_1", "textures_2", "textures_3"];
@@ -32,8 +36,7 @@ pub struct GpuScene {
     materials: DataTexture,
     material_extensions: DataTexture,
     instances: DataTexture,
-    /// Object to world of each instance in the frame that is uploaded.
-    transforms: Vec<Mat4>,
+    instance_count: u32,
     /// Index in `nodes` of the root of everything.
     top_level: u32,
     textures: [wgpu::TextureView; TEXTURE_ARRAYS.len()],
@@ -43,10 +46,8 @@ pub struct GpuScene {
     no_pyramid: wgpu::TextureView,
     /// Made when the environment is to be sampled by it.
     pyramid: Option<EnvironmentPyramid>,
-    /// The punctual lights as they are uploaded now, from `first_punctual` on.
-    punctual: Vec<Light>,
-    first_punctual: u32,
-    rest_positions: Vec<Vec3>,
+    /// Where what moves lies; none in a scene that stands still.
+    motion: Option<Motion>,
     features: SceneFeatures,
 }
 
@@ -86,13 +87,11 @@ impl GpuScene {
             Some(e) => ([e.width, e.height], &e.radiance, &e.alias),
             None => (black.0, &black.1, &black.2),
         };
-        let (first_triangles, rest) = scene.triangles.split_at(scene.triangles.len().min(FIRST_TRIANGLES));
+        let (motion, arrays) = Motion::lay_out(scene);
+        let (first_triangles, rest) = arrays.triangles.split_at(arrays.triangles.len().min(FIRST_TRIANGLES));
         let point = [bytemuck::Zeroable::zeroed()];
-        let transforms: Vec<Mat4> = scene.instances.iter().map(|i| i.transform).collect();
-        let first = scene.first_punctual as usize;
-        let punctual: Vec<Light> = scene.lights.iter().skip(first).filter(|l| !is_distant(l)).copied().collect();
         Ok(GpuScene {
-            nodes: gpu.storage_in_slices("nodes", &scene.nodes, pace).await?,
+            nodes: gpu.storage_in_slices("nodes", &arrays.nodes, pace).await?,
             triangles: [
                 gpu.storage_in_slices("triangles", first_triangles, pace).await?,
                 gpu.storage_in_slices(
@@ -102,16 +101,16 @@ impl GpuScene {
                 )
                 .await?,
             ],
-            attributes: DataTexture::in_slices(gpu, "attributes", &scene.attributes, pace).await?,
+            attributes: DataTexture::in_slices(gpu, "attributes", &arrays.attributes, pace).await?,
             materials: DataTexture::new(gpu, "materials", &scene.materials)?,
             material_extensions: DataTexture::new(gpu, "material extensions", &scene.material_extensions)?,
-            instances: DataTexture::new(gpu, "instances", &instance_records(scene, &transforms, &transforms))?,
-            transforms,
+            instances: DataTexture::new(gpu, "instances", &arrays.instances)?,
+            instance_count: scene.instances.len() as u32,
             top_level: scene.root(),
-            lights: if scene.lights.is_empty() {
+            lights: if arrays.lights.is_empty() {
                 gpu.storage("lights", std::mem::size_of::<Light>() as u64)?
             } else {
-                gpu.storage_in_slices("lights", &scene.lights, pace).await?
+                gpu.storage_in_slices("lights", &arrays.lights, pace).await?
             },
             textures: [
                 texture_array(gpu, TEXTURE_ARRAYS[0], scene.textures.first(), pace).await,
@@ -139,31 +138,28 @@ impl GpuScene {
             .await,
             no_pyramid: gpu.texture("no pyramid", UVec2::ONE, wgpu::TextureFormat::Rgba32Float),
             pyramid: None,
-            rest_positions: punctual.iter().map(|l| l.position).collect(),
-            punctual,
-            first_punctual: scene.first_punctual,
+            motion,
             features: features(scene),
         })
     }
 
-    /// Puts the lights that move where they are at `time` seconds, coming from where they were at `previous_time`.
-    pub fn animate(&mut self, gpu: &Gpu, scene: &FlatScene, previous_time: f32, time: f32) {
-        if scene.motions.is_empty() {
-            return;
-        }
-        for motion in &scene.motions {
-            let index = motion.light as usize;
-            if let (Some(light), Some(rest)) = (self.punctual.get_mut(index), self.rest_positions.get(index)) {
-                let at = |time: f32| {
-                    let turn = Quat::from_axis_angle(motion.axis, motion.angular_speed * time);
-                    motion.center + turn * (*rest - motion.center)
-                };
-                light.previous_position = at(previous_time);
-                light.position = at(time);
+    /// Brings the device up to date with what moves: this frame's transforms, shapes and lights, and those of the frame
+    /// before. Both top levels are rebuilt; a transform that cannot be undone hides its instance.
+    pub fn take_stage(&mut self, gpu: &Gpu, scene: &FlatScene, stage: &Stage) {
+        if let Some(mut motion) = self.motion.take() {
+            if motion.version != Some(stage.version()) {
+                motion.take_shapes(gpu, self, scene, stage);
+                motion.version = Some(stage.version());
+                motion.at_rest = false;
+            } else if !motion.at_rest {
+                motion.stand_still();
             }
+            if !motion.at_rest {
+                motion.place(gpu, self, scene, stage);
+                motion.at_rest = !stage.has_moved();
+            }
+            self.motion = Some(motion);
         }
-        let offset = u64::from(self.first_punctual) * std::mem::size_of::<Light>() as u64;
-        gpu.queue.write_buffer(&self.lights, offset, bytemuck::cast_slice(&self.punctual));
     }
 
     /// Whether the environment is sampled by its pyramid, which [`GpuScene::record`] then makes, or by its alias table.
@@ -191,36 +187,32 @@ impl GpuScene {
         self.pyramid.as_ref().map_or(Ok(()), |pyramid| pyramid.record(recorder))
     }
 
-    /// Moves the instances: `transforms` is object to world of each. The top level is rebuilt over them; where they stood
-    /// before becomes the previous frame's place. A transform that cannot be undone hides its instance.
-    pub fn place(&mut self, gpu: &Gpu, scene: &FlatScene, transforms: &[Mat4]) {
-        if transforms.len() != scene.instances.len() || !scene.has_top_level() {
-            return;
-        }
-        let boxes: Vec<[Vec3; 2]> = scene
-            .instances
-            .iter()
-            .zip(transforms)
-            .map(|(instance, &transform)| {
-                let root = &scene.nodes[scene.meshes[instance.mesh as usize].root as usize];
-                levels::transformed_box(transform, [root.min, root.max])
-            })
-            .collect();
-        let nodes = levels::top_level(&boxes, self.top_level);
-        let offset = u64::from(self.top_level) * size_of::<BvhNode>() as u64;
-        gpu.queue.write_buffer(&self.nodes, offset, bytemuck::cast_slice(&nodes));
-        self.instances.write(gpu, 0, &instance_records(scene, transforms, &self.transforms));
-        self.transforms = transforms.to_vec();
+    /// Overwrites triangles from index `first` on, in whichever buffer they lie.
+    fn write_triangles(&self, gpu: &Gpu, first: u32, triangles: &[Triangle]) {
+        let first = first as usize;
+        let (low, high) = triangles.split_at(FIRST_TRIANGLES.saturating_sub(first).min(triangles.len()));
+        let write = |buffer: &wgpu::Buffer, index: usize, part: &[Triangle]| {
+            if !part.is_empty() {
+                gpu.queue.write_buffer(buffer, (index * size_of::<Triangle>()) as u64, bytemuck::cast_slice(part));
+            }
+        };
+        write(&self.triangles[0], first, low);
+        write(&self.triangles[1], (first + low.len()).saturating_sub(FIRST_TRIANGLES), high);
+    }
+
+    /// Index in `nodes` of the root of everything as it was in the frame before.
+    pub fn previous_top_level(&self) -> u32 {
+        self.motion.as_ref().map_or(self.top_level, |motion| motion.previous_top_level)
+    }
+
+    /// Instances, without their twins of the frame before.
+    pub fn instance_count(&self) -> u32 {
+        self.instance_count
     }
 
     /// Index in `nodes` of the root of everything.
     pub fn top_level(&self) -> u32 {
         self.top_level
-    }
-
-    /// The punctual lights as they are uploaded now, in the order of the scene.
-    pub fn punctual_lights(&self) -> &[Light] {
-        &self.punctual
     }
 
     /// Binds everything for the passes of a frame.
@@ -258,7 +250,8 @@ fn features(scene: &FlatScene) -> SceneFeatures {
         shapes: scene.triangles.iter().any(|t| t.shape() != Shape::Triangles),
         punctual_lights: scene.lights.iter().any(|l| l.kind != LIGHT_TRIANGLE && !is_distant(l)),
         instances: scene.has_top_level(),
-        many_triangles: scene.triangles.len() > FIRST_TRIANGLES,
+        motion: !scene.rig.is_still(),
+        many_triangles: motion::triangle_count(scene) > FIRST_TRIANGLES,
         transmission: any(|m| m.transmission > 0.0),
         volumes: any(|m| m.flags & MATERIAL_VOLUME != 0),
         dispersion: any(|m| m.flags & MATERIAL_VOLUME != 0 && m.dispersion > 0.0),
@@ -278,19 +271,6 @@ fn features(scene: &FlatScene) -> SceneFeatures {
         energy_compensation: false,
         conserving_mix: false,
     }
-}
-
-fn instance_records(scene: &FlatScene, transforms: &[Mat4], previous: &[Mat4]) -> Vec<Instance> {
-    let record = |((instance, &transform), &previous): ((&FlatInstance, &Mat4), &Mat4)| Instance {
-        to_object: if levels::is_invertible(transform) { levels::rows(transform.inverse()) } else { [Vec4::ZERO; 3] },
-        to_world: levels::rows(transform),
-        previous_to_world: levels::rows(previous),
-        root: scene.meshes[instance.mesh as usize].root,
-        first_light: instance.first_light,
-        previous_triangles: 0,
-        padding: 0,
-    };
-    scene.instances.iter().zip(transforms).zip(previous).map(record).collect()
 }
 
 /// Index of the environment among the lights, or `NONE`.
@@ -408,7 +388,7 @@ mod tests {
     fn kernels_carry_what_materials_need() {
         let of = |material: Material| {
             let mesh = shapes::parallelogram(Vec3::ZERO, Vec3::X, Vec3::Y, 0);
-            let instances = vec![crate::scene::Instance { mesh: 0, transform: Mat4::IDENTITY }];
+            let instances = vec![crate::scene::Instance { mesh: 0, transform: glam::Mat4::IDENTITY }];
             let scene = Scene { meshes: vec![mesh], instances, materials: vec![material], ..Scene::default() };
             features(&FlatScene::build(&scene, &mut |_, _| ()).expect("a good scene"))
         };

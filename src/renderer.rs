@@ -11,12 +11,13 @@ use crate::output::Image;
 use crate::pace::Pace;
 use crate::params::{FilmParams, Params, RenderParams};
 use crate::scene::flat::environment;
+use crate::scene::stage::Stage;
 use crate::scene::{Camera, Environment, FlatScene};
 use crate::techniques::{self, Technique};
 use glam::{UVec2, Vec2};
 
 /// Debug views that every technique has; the first is the picture itself.
-pub const COMMON_VIEWS: &[&str] = &["radiance", "albedo", "normal", "depth"];
+pub const COMMON_VIEWS: &[&str] = &["radiance", "albedo", "normal", "depth", "motion"];
 
 /// `Frame::view` of the common views after the first, as `shaders/film/view.wgsl` numbers them.
 const FIRST_COMMON_VIEW: u32 = 1000;
@@ -25,7 +26,7 @@ const FIRST_COMMON_VIEW: u32 = 1000;
 const ENVIRONMENT_BY_PYRAMID: u32 = 1;
 
 /// Seconds of scene time between two frames.
-const FRAME_TIME: f32 = 1.0 / 60.0;
+const FRAME_TIME: f64 = 1.0 / 60.0;
 
 /// Auxiliary pictures of the first surface each pixel sees. Zero where there is none.
 #[derive(Debug, Clone, Default)]
@@ -36,6 +37,9 @@ pub struct Auxiliary {
     pub normal: Vec<[f32; 3]>,
     /// Distance along the view axis in metres.
     pub depth: Vec<f32>,
+    /// How far what the pixel sees has moved since the frame before, in pixels, x to the right and y down. Not zero where
+    /// there is no surface: the background moves with the camera's turn.
+    pub motion: Vec<[f32; 2]>,
 }
 
 /// What was counted.
@@ -62,6 +66,7 @@ pub struct Renderer {
     visibility: [wgpu::TextureView; 2],
     albedo_depth: wgpu::TextureView,
     normal: wgpu::TextureView,
+    motion: wgpu::TextureView,
     timer: Option<Timer>,
     display_timer: Option<Timer>,
     render_params: RenderParams,
@@ -69,15 +74,30 @@ pub struct Renderer {
     /// Whether the environment was updated since its alias table was built.
     alias_is_stale: bool,
     camera: Camera,
-    /// The camera of the frame before, if its technique left a history.
+    /// The camera of the scene that `camera` follows as it moves.
+    followed: Option<usize>,
+    /// The camera of the frame before, if there was one.
     previous_camera: Option<Camera>,
+    /// Whether the frame before ran the technique, so that it has a history.
+    has_history: bool,
     view: u32,
     seed: u32,
     accumulate: bool,
     frame_index: u32,
-    /// Scene time in steps of [`FRAME_TIME`]. It stands still while frames are accumulated.
-    moment: u32,
-    previous_moment: u32,
+    /// What of the scene moves, as it is on the device.
+    stage: Stage,
+    /// The animation that is played.
+    clip: usize,
+    /// Scene time in seconds. It stands still while frames are accumulated.
+    time: f64,
+    /// Where time begins after a reset.
+    start_time: f64,
+    /// Whether the next frame is at `time` itself, not a step after it.
+    time_was_set: bool,
+    /// Seconds of scene time in a second of frames.
+    speed: f64,
+    /// What `time` was in the frame before.
+    previous_time: f64,
     accumulated: u32,
     restart_film: bool,
     /// One line for each shader whose last edit did not compile (debug builds).
@@ -103,7 +123,7 @@ impl Renderer {
         let film = Film::new(&gpu, size)?;
         let camera = scene.cameras.first().cloned().ok_or_else(|| Error::bad_value("scene", "has no camera"))?;
         let technique = (techniques::ALL[0].create)(&gpu);
-        let [albedo_depth, normal] = auxiliary_textures(&gpu, size);
+        let [albedo_depth, normal, motion] = auxiliary_textures(&gpu, size);
         let renderer = Renderer {
             gpu_scene,
             technique,
@@ -113,19 +133,27 @@ impl Renderer {
             visibility: visibility_textures(&gpu, size),
             albedo_depth,
             normal,
+            motion,
             timer: Timer::new(&gpu),
             display_timer: Timer::new(&gpu),
             render_params: RenderParams::default(),
             film_params: FilmParams::default(),
             alias_is_stale: false,
             camera,
+            followed: Some(0),
             previous_camera: None,
+            has_history: false,
             view: 0,
             seed: 0,
-            accumulate: scene.motions.is_empty(),
+            accumulate: scene.rig.is_still(),
             frame_index: 0,
-            moment: 0,
-            previous_moment: 0,
+            stage: Stage::new(&scene, 0, 0.0),
+            clip: 0,
+            time: 0.0,
+            start_time: 0.0,
+            time_was_set: true,
+            speed: 1.0,
+            previous_time: 0.0,
             accumulated: 0,
             restart_film: true,
             shader_problems: Vec::new(),
@@ -149,6 +177,11 @@ impl Renderer {
     /// The scene as it is on the device now.
     pub fn gpu_scene(&self) -> &GpuScene {
         &self.gpu_scene
+    }
+
+    /// What of the scene moves, as the last frame showed it.
+    pub fn stage(&self) -> &Stage {
+        &self.stage
     }
 
     /// The film.
@@ -195,9 +228,13 @@ impl Renderer {
         self.gpu.check()?;
         self.gpu_scene = gpu_scene;
         self.alias_is_stale = false;
-        self.accumulate = scene.motions.is_empty();
+        self.accumulate = scene.rig.is_still();
+        self.stage = Stage::new(&scene, 0, 0.0);
         self.scene = scene;
         self.camera = camera;
+        self.followed = Some(0);
+        self.clip = 0;
+        self.set_time(0.0);
         self.reset();
         Ok(())
     }
@@ -300,6 +337,7 @@ impl Renderer {
     /// Moves the camera. The film starts again; the technique keeps its history and reprojects it.
     pub fn set_camera(&mut self, camera: &Camera) {
         self.camera = camera.clone();
+        self.followed = None;
         self.restart_film = true;
     }
 
@@ -337,22 +375,78 @@ impl Renderer {
         }
     }
 
+    /// Looks through camera `index` of the scene, and moves with it.
+    ///
+    /// # Errors
+    /// `UNKNOWN_NAME` listing the cameras there are.
+    pub fn follow_camera(&mut self, index: usize) -> Result<()> {
+        let Some(camera) = self.stage.camera(&self.scene, index).filter(|_| index < self.scene.cameras.len()) else {
+            return Err(Error::Unknown {
+                kind: "camera",
+                name: index.to_string(),
+                known: (0..self.scene.cameras.len()).map(|i| i.to_string()).collect::<Vec<_>>().join(", "),
+            });
+        };
+        self.camera = camera;
+        self.followed = Some(index);
+        self.restart_film = true;
+        Ok(())
+    }
+
+    /// Plays another animation of the scene, by name or index, from the moment that time is at.
+    ///
+    /// # Errors
+    /// `UNKNOWN_NAME` listing the animations there are.
+    pub fn set_animation(&mut self, name: &str) -> Result<()> {
+        self.clip = self.scene.rig.find_clip(name)?;
+        self.set_time(self.time);
+        Ok(())
+    }
+
+    /// Index of the animation that is played.
+    pub fn animation(&self) -> usize {
+        self.clip
+    }
+
+    /// Goes to a moment, in seconds: the next frame shows it. The film starts again; the technique keeps its history and
+    /// reprojects it. A reset comes back to this moment. Times that are not finite are ignored.
+    pub fn set_time(&mut self, seconds: f64) {
+        if seconds.is_finite() {
+            (self.time, self.start_time, self.time_was_set) = (seconds, seconds, true);
+            self.restart_film = true;
+        }
+    }
+
+    /// The moment that the last frame showed, or that [`Renderer::set_time`] asks the next one for.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Sets how fast time runs while it does: 1 is a 60th of a second a frame, negative is backwards.
+    pub fn set_speed(&mut self, speed: f64) {
+        if speed.is_finite() {
+            self.speed = speed;
+        }
+    }
+
     /// Sets the seed of all random numbers and starts again.
     pub fn set_seed(&mut self, seed: u32) {
         self.seed = seed;
         self.reset();
     }
 
-    /// Whether frames are averaged. On, time stands still where it is; off, each frame is shown alone and lights move.
+    /// Whether frames are averaged. On, time stands still where it is; off, it runs, and each frame is shown alone.
     pub fn set_accumulate(&mut self, accumulate: bool) {
         self.accumulate = accumulate;
         self.restart_film = true;
     }
 
-    /// Starts again: frame 0, time 0, no history, an empty film.
+    /// Starts again: frame 0, the moment last set (0 at first), no history, an empty film.
     pub fn reset(&mut self) {
         self.frame_index = 0;
+        (self.time, self.time_was_set) = (self.start_time, true);
         self.previous_camera = None;
+        self.has_history = false;
         self.technique_ready = false;
         self.restart_film = true;
     }
@@ -369,7 +463,7 @@ impl Renderer {
         self.technique.prepare(&self.gpu, size)?;
         self.film = film;
         self.visibility = visibility_textures(&self.gpu, size);
-        [self.albedo_depth, self.normal] = auxiliary_textures(&self.gpu, size);
+        [self.albedo_depth, self.normal, self.motion] = auxiliary_textures(&self.gpu, size);
         self.reset();
         self.gpu.check()
     }
@@ -410,11 +504,12 @@ impl Renderer {
         recorder.share("previous_visibility", &self.visibility[1 - parity]);
         recorder.pass(&table::SCENE_VISIBILITY).bind("visibility_out", &self.visibility[parity]).dispatch_over(size)?;
         if self.view >= FIRST_COMMON_VIEW {
-            record_auxiliary(&mut recorder, &self.albedo_depth, &self.normal, size)?;
+            record_auxiliary(&mut recorder, [&self.albedo_depth, &self.normal, &self.motion], size)?;
             recorder
                 .pass(&table::FILM_VIEW)
                 .bind("albedo_depth", &self.albedo_depth)
                 .bind("normal", &self.normal)
+                .bind("motion", &self.motion)
                 .dispatch_over(size)?;
         } else {
             self.technique.record(&mut recorder, size)?;
@@ -424,23 +519,29 @@ impl Renderer {
 
         self.accumulated = if restart { 1 } else { self.accumulated + 1 };
         self.restart_film = false;
+        self.previous_camera = Some(self.camera.clone());
         // The common views run no technique, and leave its history as old as it was.
-        self.previous_camera = (self.view < FIRST_COMMON_VIEW).then(|| self.camera.clone());
+        self.has_history = self.view < FIRST_COMMON_VIEW;
         self.frame_index = self.frame_index.wrapping_add(1);
         self.gpu.check()
     }
 
     /// Goes on to this frame's moment. Where time stands still, nothing has moved since the frame before.
     fn advance_time(&mut self) {
+        self.previous_time = self.time;
+        if !std::mem::take(&mut self.time_was_set) && !self.accumulate {
+            self.time += self.speed * FRAME_TIME;
+        }
         if self.frame_index == 0 {
-            self.moment = 0;
+            self.previous_time = self.time;
+            self.stage.start(&self.scene, self.clip, self.time);
+        } else {
+            self.stage.step(&self.scene, self.clip, self.time);
         }
-        self.previous_moment = self.moment;
-        if self.frame_index > 0 && !self.accumulate {
-            self.moment = self.moment.wrapping_add(1);
+        self.gpu_scene.take_stage(&self.gpu, &self.scene, &self.stage);
+        if let Some(camera) = self.followed.and_then(|index| self.stage.camera(&self.scene, index)) {
+            self.camera = camera;
         }
-        let [previous, now] = [self.previous_moment, self.moment].map(|moment| moment as f32 * FRAME_TIME);
-        self.gpu_scene.animate(&self.gpu, &self.scene, previous, now);
     }
 
     /// Brings the display buffer up to date with the film.
@@ -456,10 +557,10 @@ impl Renderer {
         self.gpu.check()
     }
 
-    /// Cosine and sine of the turn of environment and sun at a moment.
-    fn environment_turn(&self, moment: u32) -> Vec2 {
+    /// Cosine and sine of the turn of environment and sun at a time in seconds.
+    fn environment_turn(&self, time: f64) -> Vec2 {
         let RenderParams { environment_rotation, environment_rotation_rate, .. } = self.render_params;
-        let degrees = environment_rotation + environment_rotation_rate * (moment as f32 * FRAME_TIME);
+        let degrees = environment_rotation + environment_rotation_rate * time as f32;
         Vec2::from_angle((degrees % 360.0).to_radians())
     }
 
@@ -482,15 +583,15 @@ impl Renderer {
             environment_light: environment_light(&self.scene),
             view: self.view,
             scene_radius: 0.5 * (high - low).length(),
-            history: self.previous_camera.is_some().into(),
+            history: (self.has_history && !self.stage.is_renumbered()).into(),
             pixel_filter: self.render_params.pixel_filter,
             top_level: self.gpu_scene.top_level(),
             texture_levels: self.render_params.texture_levels,
             sun_light: sun_light(&self.scene),
-            environment_turn: self.environment_turn(self.moment),
-            previous_environment_turn: self.environment_turn(self.previous_moment),
-            padding_0: 0,
-            padding_1: 0,
+            environment_turn: self.environment_turn(self.time),
+            previous_environment_turn: self.environment_turn(self.previous_time),
+            previous_top_level: self.gpu_scene.previous_top_level(),
+            instance_count: self.gpu_scene.instance_count(),
         }
     }
 
@@ -546,7 +647,7 @@ impl Renderer {
         self.render_params.specialise(&mut recorder.features);
         recorder.share("frame", &self.frame_uniform);
         recorder.share("visibility", &self.visibility[(self.frame_index.wrapping_sub(1) & 1) as usize]);
-        record_auxiliary(&mut recorder, &self.albedo_depth, &self.normal, self.size())?;
+        record_auxiliary(&mut recorder, [&self.albedo_depth, &self.normal, &self.motion], self.size())?;
         recorder.submit();
         let mut out = Auxiliary::default();
         for texel in self.gpu.read_texture(self.albedo_depth.texture(), 16).await?.chunks_exact(16) {
@@ -557,6 +658,10 @@ impl Renderer {
         for texel in self.gpu.read_texture(self.normal.texture(), 16).await?.chunks_exact(16) {
             let [x, y, z, _]: [f32; 4] = bytemuck::pod_read_unaligned(texel);
             out.normal.push([x, y, z]);
+        }
+        for texel in self.gpu.read_texture(self.motion.texture(), 16).await?.chunks_exact(16) {
+            let [x, y, ..]: [f32; 4] = bytemuck::pod_read_unaligned(texel);
+            out.motion.push([x, y]);
         }
         Ok(out)
     }
@@ -595,19 +700,19 @@ fn visibility_textures(gpu: &Gpu, size: UVec2) -> [wgpu::TextureView; 2] {
     [0, 1].map(|_| gpu.texture("visibility", size, wgpu::TextureFormat::Rgba32Uint))
 }
 
-fn auxiliary_textures(gpu: &Gpu, size: UVec2) -> [wgpu::TextureView; 2] {
-    ["albedo and depth", "normal"].map(|label| gpu.texture(label, size, wgpu::TextureFormat::Rgba32Float))
+fn auxiliary_textures(gpu: &Gpu, size: UVec2) -> [wgpu::TextureView; 3] {
+    ["albedo and depth", "normal", "motion"].map(|label| gpu.texture(label, size, wgpu::TextureFormat::Rgba32Float))
 }
 
 fn record_auxiliary(
     recorder: &mut Recorder<'_>,
-    albedo_depth: &wgpu::TextureView,
-    normal: &wgpu::TextureView,
+    [albedo_depth, normal, motion]: [&wgpu::TextureView; 3],
     size: UVec2,
 ) -> Result<()> {
     recorder
         .pass(&table::SCENE_AUXILIARY)
         .bind("albedo_depth_out", albedo_depth)
         .bind("normal_out", normal)
+        .bind("motion_out", motion)
         .dispatch_over(size)
 }

@@ -291,6 +291,41 @@ impl Viewer {
         Ok(())
     }
 
+    /// Looks through a camera of the scene, by index, and moves with it.
+    pub fn follow_camera(&mut self, index: usize) -> JsResult<()> {
+        self.renderer.follow_camera(index).js()
+    }
+
+    /// The camera in use, as JSON.
+    pub fn camera(&self) -> String {
+        camera_to_json(self.renderer.camera()).to_string()
+    }
+
+    /// Goes to a moment of the scene, in seconds.
+    pub fn set_time(&mut self, seconds: f64) {
+        self.renderer.set_time(seconds);
+    }
+
+    /// The moment that is shown, in seconds.
+    pub fn time(&self) -> f64 {
+        self.renderer.time()
+    }
+
+    /// How fast time runs while it does.
+    pub fn set_speed(&mut self, speed: f64) {
+        self.renderer.set_speed(speed);
+    }
+
+    /// Plays another animation, by name or index.
+    pub fn set_animation(&mut self, name: &str) -> JsResult<()> {
+        self.renderer.set_animation(name).js()
+    }
+
+    /// Index of the animation that is played.
+    pub fn animation(&self) -> usize {
+        self.renderer.animation()
+    }
+
     /// The scene's cameras as a JSON list.
     pub fn cameras(&self) -> String {
         self.renderer.scene().cameras.iter().map(camera_to_json).collect::<serde_json::Value>().to_string()
@@ -304,9 +339,13 @@ impl Viewer {
     /// Scene statistics, whether it moves, and warnings, as JSON.
     pub fn info(&self) -> String {
         let scene = self.renderer.scene();
+        let animations =
+            scene.rig.clips.iter().map(|clip| serde_json::json!({"name": clip.name, "seconds": clip.duration}));
         serde_json::json!({
             "name": scene.name, "stats": scene.stats, "warnings": scene.warnings,
-            "animated": !scene.motions.is_empty(),
+            "animations": animations.collect::<Vec<_>>(), "seconds": scene.rig.duration(0),
+            "moving_cameras": scene.rig.cameras.iter().map(|camera| camera.target).collect::<Vec<_>>(),
+            "animated": !scene.rig.is_still(),
             "adapter": self.renderer.gpu().adapter_name(),
             "software": self.renderer.gpu().is_software(),
         })

@@ -12,7 +12,7 @@ use support::bsdf::{
     ALL, Bsdf, CLEARCOAT, DIFFUSE, LOBES, Model, Operation, Query, SHEEN, SPECULAR, TRANSMISSION, eval, g1,
     iridescent_fresnel, schlick, sheen_value, table_read,
 };
-use support::shader_copy::ShaderCopy;
+use support::plants::ShaderCopy;
 use support::statistics::{chi_squared, significance};
 use support::{fresh_gpu, gpu};
 

@@ -80,6 +80,7 @@ fn exr(folder: &Folder, name: &str, width: u32, height: u32, value: f32) -> Stri
         albedo: None,
         normal: None,
         depth: None,
+        motion: None,
         technique: "none",
         parameters: "{}",
         seed: 0,
@@ -351,6 +352,7 @@ fn info_says_what_a_scene_holds() {
     }
     assert!(info["triangles"].as_u64().unwrap() >= 12 && info["lights"].as_u64().unwrap() >= 1, "{info}");
     assert!(info["warnings"].is_array() && !info["cameras"].as_array().unwrap().is_empty(), "{info}");
+    assert!(info["texture_arrays"].as_array().unwrap().is_empty(), "{info}");
     assert!(succeed(&["info", "builtin:cornell"]).contains("triangles"));
 }
 
@@ -463,4 +465,40 @@ fn output_that_nobody_reads_is_no_error() {
     drop(child.stdout.take());
     let output = child.wait_with_output().unwrap();
     assert_eq!((output.status.code(), stderr(&output)), (Some(0), String::new()));
+}
+
+#[test]
+fn moments_and_sequences() {
+    let folder = Folder::new("motion");
+    let out = folder.path("still.png");
+    let base = ["render", "builtin:motion", "--technique", "normals", "--size", "48x32", "--json"];
+    let still = |time: &str, extra: &[&str]| {
+        let args = [&base[..], &["--time", time, "--frames", "1", "--out", &out], extra].concat();
+        let report = succeed_json(&args);
+        assert_eq!(report["time"], time.parse::<f64>().unwrap(), "{report}");
+        std::fs::read(&out).unwrap()
+    };
+    let [start, middle] = ["0", "1.5"].map(|time| still(time, &[]));
+    assert_ne!(start, middle, "things have moved");
+    assert_eq!(still("5.5", &[]), middle, "a loop of four seconds");
+    assert_eq!(still("1.5", &["--animation", "everything"]), middle);
+    assert_ne!(still("1.5", &["--camera", "moving"]), still("0.5", &["--camera", "moving"]));
+
+    // A sequence: each picture is that of its moment.
+    let sequence = folder.path("run.png");
+    succeed_json(&[&base[..], &["--animate", "2", "--frames", "4", "--out", &sequence]].concat());
+    let numbered = |i: u32| std::fs::read(folder.path(&format!("run-000{i}.png"))).unwrap();
+    assert_eq!((numbered(0), numbered(3)), (start, middle));
+    assert!(!std::path::Path::new(&sequence).exists());
+
+    for (args, text) in [
+        (&["--animation", "dance"][..], "everything"),
+        (&["--time", "soon"], "time"),
+        (&["--animate", "0"], "animate"),
+        (&["--animate", "2", "--seconds", "1"], "--seconds"),
+    ] {
+        let output = restir(&[&["render", "builtin:motion", "--out", &out], args].concat());
+        assert_eq!(output.status.code(), Some(2), "{args:?}");
+        assert!(String::from_utf8_lossy(&output.stderr).contains(text), "{args:?}");
+    }
 }

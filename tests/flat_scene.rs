@@ -316,7 +316,7 @@ fn a_million_lights_fit() {
     }
 }
 
-/// Something of everything: textures, environment, motions, double-sided and masked materials.
+/// Something of everything: textures, environment, revolving lights, double-sided and masked materials.
 fn rich() -> FlatScene {
     let mut scene = builtin::make("cornell-64").expect("known");
     scene.textures.push(Texture {
@@ -396,7 +396,7 @@ fn planted_faults_are_found() {
         ("materials[0]", |flat| flat.materials[0].base_color_texture.place |= 1 << 20),
         ("lights[0]", |flat| flat.lights[0].alias_light = 1000),
         ("lights[9]", |flat| flat.lights[9].kind = 9),
-        ("motions[2]", |flat| flat.motions[2].light = 66),
+        ("rig.lights[2]", |flat| flat.rig.lights[2].target = 66),
         ("environment", |flat| flat.environment.as_mut().expect("there").alias[0][1] = 8),
         ("scene", |flat| flat.cameras.clear()),
     ];

@@ -226,6 +226,7 @@ fn kinds() -> Vec<Kind> {
         albedo: None,
         normal: None,
         depth: None,
+        motion: None,
         technique: "",
         parameters: "",
         seed: 0,

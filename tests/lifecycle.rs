@@ -330,8 +330,8 @@ fn cameras_move_through_everything() {
 
 /// Where the first moving light is now, and where it was in the frame before.
 fn moving_light(renderer: &Renderer) -> [Vec3; 2] {
-    let light = renderer.gpu_scene().punctual_lights()[renderer.scene().motions[0].light as usize];
-    [light.position, light.previous_position]
+    let (stage, light) = (renderer.stage(), renderer.scene().rig.lights[0].target as usize);
+    [stage.lights[light].position, stage.previous_lights[light].position]
 }
 
 #[test]

@@ -39,6 +39,7 @@ fn described(image: &Image) -> ExrPicture<'_> {
         albedo: None,
         normal: None,
         depth: None,
+        motion: None,
         technique: "restir-di",
         parameters: r#"{"film":{"exposure":0.0}}"#,
         seed: 4_000_000_000,
@@ -61,14 +62,23 @@ fn exr_carries_its_channels_and_attributes() {
     let albedo = vec![[0.1, 0.2, 0.3]; 15];
     let normal = vec![[0.0, 1.0, 0.0]; 15];
     let depth: Vec<f32> = (0..15).map(|i| i as f32).collect();
-    let described =
-        ExrPicture { albedo: Some(&albedo), normal: Some(&normal), depth: Some(&depth), ..described(&image) };
+    let motion: Vec<[f32; 2]> = (0..15).map(|i| [i as f32, -(i as f32)]).collect();
+    let described = ExrPicture {
+        albedo: Some(&albedo),
+        normal: Some(&normal),
+        depth: Some(&depth),
+        motion: Some(&motion),
+        ..described(&image)
+    };
     let bytes = encode_exr(&described).unwrap();
 
     let file = read_all_flat_layers_from_memory(&bytes);
     let layer = &file.layer_data[0];
     let names: Vec<String> = layer.channel_data.list.iter().map(|c| c.name.to_string()).collect();
-    let expected = ["B", "G", "R", "albedo.B", "albedo.G", "albedo.R", "depth.Z", "normal.X", "normal.Y", "normal.Z"];
+    let expected = [
+        "B", "G", "R", "albedo.B", "albedo.G", "albedo.R", "depth.Z", "motion.X", "motion.Y", "normal.X", "normal.Y",
+        "normal.Z",
+    ];
     assert_eq!(names, expected);
     let channel = |name: &str| -> Vec<f32> {
         let found = layer.channel_data.list.iter().find(|c| c.name.to_string() == name).unwrap();

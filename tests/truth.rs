@@ -10,7 +10,7 @@ mod support;
 use restir::scene::Camera;
 use restir::{FlatScene, Gpu, Image, Renderer};
 use std::sync::OnceLock;
-use support::shader_copy::ShaderCopy;
+use support::plants::ShaderCopy;
 use support::*;
 
 const SIZE: u32 = 64;

@@ -68,6 +68,12 @@ export interface SceneReport {
   warnings: string[];
   /** Whether something moves; then frames are not averaged unless asked for. */
   animated: boolean;
+  /** Animations to choose from, each a loop of so many seconds. */
+  animations: { name: string; seconds: number }[];
+  /** Seconds after which the first animation starts again. */
+  seconds: number;
+  /** Indices of cameras that move. */
+  moving_cameras: number[];
   adapter: string;
 }
 

@@ -12,6 +12,7 @@ import init, { Viewer, describe } from './pkg/restir.js';
 import type { Choice, Contents, Loaded, SceneSource, Surroundings } from './protocol.js';
 import { RenderLoop } from './render-loop.js';
 import { Resolution } from './resolution.js';
+import { TimeControls } from './time.js';
 import { readQuery, writeQuery } from './url-state.js';
 import { compileWasm } from './wasm.js';
 
@@ -44,6 +45,21 @@ class App {
   private readonly orbit = new OrbitCamera();
   private readonly controls = new Controls(this.canvas, this.orbit);
   private readonly resolution = new Resolution(this.canvas);
+  private readonly time = new TimeControls({
+    play: (on) => this.setAccumulate(!on),
+    seek: (seconds) => {
+      this.state.time = seconds;
+      this.change((viewer) => viewer.set_time(seconds));
+    },
+    speed: (factor) => {
+      this.state.speed = factor;
+      this.change((viewer) => viewer.set_speed(factor));
+    },
+    animation: (index) => {
+      this.state.animation = index;
+      this.change((viewer) => viewer.set_animation(index));
+    },
+  });
   private readonly query = readQuery(location.search, defaultTechnique);
   private readonly state = this.query.state;
   private description: Description | undefined;
@@ -54,6 +70,8 @@ class App {
   /** The scene as the worker made it: a lost device is rebuilt from it. */
   private flat: Uint8Array | undefined;
   private cameras: Camera[] = [];
+  /** Indices of cameras that move. */
+  private movingCameras: number[] = [];
   private adapter = '';
   private rendered: [number, number] = [0, 0];
   private stats: Stats | undefined;
@@ -153,10 +171,7 @@ class App {
   private async replaceScene(viewer: Viewer, flat: Uint8Array, keepView: boolean): Promise<void> {
     await viewer.load(flat);
     if (keepView) this.state.pose = this.orbit.toCamera();
-    else {
-      this.state.camera = '0';
-      this.state.pose = undefined;
-    }
+    else Object.assign(this.state, { camera: '0', pose: undefined, time: 0, animation: '0' });
     this.sceneOpened(viewer);
   }
 
@@ -170,13 +185,50 @@ class App {
 
   private sceneOpened(viewer: Viewer): void {
     this.cameras = JSON.parse(viewer.cameras()) as Camera[];
-    const { warnings, animated, adapter } = JSON.parse(viewer.info()) as SceneReport;
-    showWarnings([...this.query.warnings, ...warnings]);
-    this.adapter = adapter;
-    if (this.state.accumulate !== undefined) viewer.set_accumulate(this.state.accumulate);
-    byId('accumulate', HTMLInputElement).checked = this.state.accumulate ?? !animated;
+    const report = JSON.parse(viewer.info()) as SceneReport;
+    this.adapter = report.adapter;
+    this.movingCameras = report.moving_cameras;
+    this.openTime(viewer, report);
+    showWarnings([...this.query.warnings, ...report.warnings]);
     fillMenu(menu('camera'), this.cameras.map((camera, index) => [String(index), camera.name || `camera ${index}`]), String(this.cameraIndex()));
     this.takeCamera(viewer);
+  }
+
+  // Time
+
+  /** Takes the moment, the speed and the animation that the address asks for. */
+  private openTime(viewer: Viewer, report: SceneReport): void {
+    const { state } = this;
+    try {
+      if (state.animation !== '0') viewer.set_animation(state.animation);
+    } catch (error) {
+      this.query.warnings.push(`animation=${state.animation} in the address: ${toFailure(error).message}`);
+      state.animation = '0';
+    }
+    viewer.set_speed(state.speed);
+    viewer.set_time(state.time);
+    const accumulate = state.accumulate ?? !report.animated;
+    viewer.set_accumulate(accumulate);
+    this.time.open(report, viewer.animation(), state.speed);
+    this.showAccumulate(accumulate);
+  }
+
+  /** Averages frames while time stands still, or lets it run. */
+  private setAccumulate(on: boolean): void {
+    this.state.accumulate = on;
+    this.showAccumulate(on);
+    this.change((viewer) => {
+      viewer.set_accumulate(on);
+      // A link shows the moment at which time was stopped.
+      this.state.time = viewer.time();
+      if (on) viewer.set_time(viewer.time());
+      this.writeUrl();
+    });
+  }
+
+  private showAccumulate(on: boolean): void {
+    byId('accumulate', HTMLInputElement).checked = on;
+    this.time.showPlaying(!on);
   }
 
   // Cameras
@@ -191,9 +243,19 @@ class App {
   private takeCamera(viewer: Viewer): void {
     const camera = this.cameras[this.cameraIndex()];
     if (!camera) return;
-    const posed = { ...camera, ...this.state.pose };
-    this.orbit.set(posed, viewer.bounds());
-    viewer.set_camera(JSON.stringify(posed));
+    if (this.state.pose) {
+      const posed = { ...camera, ...this.state.pose };
+      this.orbit.set(posed, viewer.bounds());
+      viewer.set_camera(JSON.stringify(posed));
+      return;
+    }
+    viewer.follow_camera(this.cameraIndex());
+    this.orbit.set(JSON.parse(viewer.camera()) as Camera, viewer.bounds());
+  }
+
+  /** Whether the picture is seen through a camera that moves by itself. */
+  private followsCamera(): boolean {
+    return this.state.pose === undefined && this.movingCameras.includes(this.cameraIndex());
   }
 
   // Settings
@@ -329,10 +391,7 @@ class App {
       this.writeUrl();
     });
     const accumulate = byId('accumulate', HTMLInputElement);
-    accumulate.addEventListener('change', () => {
-      const on = (this.state.accumulate = accumulate.checked);
-      this.change((viewer) => viewer.set_accumulate(on));
-    });
+    accumulate.addEventListener('change', () => this.setAccumulate(accumulate.checked));
     menu('navigation').addEventListener('change', () => (this.controls.mode = menu('navigation').value === 'fly' ? 'fly' : 'orbit'));
 
     const file = byId('file', HTMLInputElement);
@@ -356,7 +415,7 @@ class App {
   private shortcut(event: KeyboardEvent): void {
     const typing = event.target instanceof Element && event.target.closest('button, input, select, summary');
     if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
-    const buttons: Record<string, string> = { ' ': 'pause', '.': 'step', r: 'reset', h: 'fold' };
+    const buttons: Record<string, string> = { ' ': 'pause', '.': 'step', r: 'reset', h: 'fold', p: 'play' };
     const id = buttons[event.key];
     if (!id) return;
     event.preventDefault();
@@ -405,6 +464,9 @@ class App {
   private async afterFrame(viewer: Viewer, milliseconds: number): Promise<void> {
     performance.mark('picture');
     this.resolution.observe(milliseconds);
+    this.time.showTime(viewer.time());
+    // The user takes over from where the camera is.
+    if (this.followsCamera()) this.orbit.set(JSON.parse(viewer.camera()) as Camera, viewer.bounds());
     const now = performance.now();
     if (now - this.statsTime > statsInterval || this.loop.isComplete(viewer)) {
       this.statsTime = now;

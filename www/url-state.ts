@@ -13,6 +13,12 @@ export interface PageState {
   accumulate: boolean | undefined;
   /** Point lights to scatter in a scene that has none. */
   lights: number;
+  /** Moment of the scene in seconds: where time stands still, or began to run. */
+  time: number;
+  /** How fast time runs. */
+  speed: number;
+  /** Index or name among the scene's animations. */
+  animation: string;
   /** Index or name among the scene's cameras. */
   camera: string;
   /** Where the user has moved to, if they have. */
@@ -35,6 +41,9 @@ export const defaultState = (technique: string): PageState => ({
   seed: 0,
   accumulate: undefined,
   lights: 0,
+  time: 0,
+  speed: 1,
+  animation: '0',
   camera: '0',
   pose: undefined,
   size: undefined,
@@ -61,6 +70,12 @@ function scale(text: string): number {
   return value;
 }
 
+function finite(text: string): number {
+  const value = Number(text);
+  if (text.trim() === '' || !Number.isFinite(value)) throw new Error('must be a number');
+  return value;
+}
+
 function accumulate(text: string): boolean {
   if (text !== 'yes' && text !== 'no') throw new Error('must be yes or no');
   return text === 'yes';
@@ -84,6 +99,9 @@ const readers: Record<string, (state: PageState, text: string) => void> = {
   seed: (state, text) => (state.seed = integer(text, 0, 0xffffffff)),
   accumulate: (state, text) => (state.accumulate = accumulate(text)),
   lights: (state, text) => (state.lights = integer(text, 0, 1_000_000)),
+  time: (state, text) => (state.time = finite(text)),
+  speed: (state, text) => (state.speed = finite(text)),
+  animation: (state, text) => (state.animation = text),
   camera: (state, text) => (state.camera = text),
   pose: (state, text) => (state.pose = pose(text)),
   size: (state, text) => (state.size = size(text)),
@@ -121,6 +139,9 @@ export function writeQuery(state: PageState, technique: string): string {
   put('seed', state.seed, defaults.seed);
   put('accumulate', state.accumulate === undefined ? undefined : state.accumulate ? 'yes' : 'no', undefined);
   put('lights', state.lights, defaults.lights);
+  put('time', Number(state.time.toFixed(3)), defaults.time);
+  put('speed', state.speed, defaults.speed);
+  put('animation', state.animation, defaults.animation);
   put('camera', state.camera, defaults.camera);
   put('pose', state.pose && poseText(state.pose), undefined);
   put('size', state.size?.join('x'), undefined);

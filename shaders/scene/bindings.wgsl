@@ -36,8 +36,8 @@ struct Frame {
     previous_environment_turn: vec2f, // the same in the previous frame
     sun_light: u32, // index of the sun in `lights`, or NONE
     texture_levels: u32, // TEXTURE_LEVELS_CONE or TEXTURE_LEVELS_FINEST
-    padding_0: u32,
-    padding_1: u32,
+    previous_top_level: u32, // the same of the previous frame
+    instance_count: u32, // the twins of instances, as they were in the previous frame, come after as many
 }
 
 struct BvhNode {
@@ -69,7 +69,6 @@ struct TriangleAttributes {
 struct Instance {
     to_object: array<vec4f, 3>,
     to_world: array<vec4f, 3>,
-    previous_to_world: array<vec4f, 3>,
     root: u32,
     first_light: u32,
     previous_triangles: u32,
@@ -101,8 +100,6 @@ struct Material {
 struct Light {
     position: vec3f,
     kind: u32,
-    previous_position: vec3f,
-    triangle: u32,
     direction: vec3f,
     range: f32,
     intensity: vec3f,
@@ -111,10 +108,10 @@ struct Light {
     pmf: f32, // p(light)
     alias_threshold: f32,
     alias_light: u32,
+    triangle: u32,
     instance: u32,
-    padding_0: u32,
-    padding_1: u32,
-    padding_2: u32,
+    previous: u32, // this light as it was in the previous frame
+    padding: u32,
 }
 
 // What the scene has, fixed when a pipeline is made (src/gpu_scene.rs), so that no kernel carries code that its scene
@@ -133,6 +130,8 @@ override scene_has_punctual_lights: bool = true;
 override scene_has_environment_pyramid: bool = true;
 // More than one instance: else there is one, that of what never moves, in world space.
 override scene_has_instances: bool = true;
+// Anything that is not where it was in the previous frame: else that frame's scene is this one's.
+override scene_has_motion: bool = true;
 // More triangles than one storage binding holds.
 override scene_has_many_triangles: bool = true;
 

@@ -156,8 +156,9 @@ fn safe_inverse(direction: vec3f) -> vec3f {
 }
 
 // The closest hit with 0 < t < t_max, or, with `any_hit`, whichever is found first. Distances are the same in the space
-// of every mesh, for the ray's direction is not normalised on the way there.
-fn traverse(world_origin: vec3f, world_direction: vec3f, t_max: f32, any_hit: bool) -> Hit {
+// of every mesh, for the ray's direction is not normalised on the way there. `top_level` is the scene's root, that of this
+// frame or of the previous one.
+fn traverse_from(top_level: u32, world_origin: vec3f, world_direction: vec3f, t_max: f32, any_hit: bool) -> Hit {
     rays_traced += 1u;
     var origin = world_origin;
     var direction = world_direction;
@@ -165,7 +166,7 @@ fn traverse(world_origin: vec3f, world_direction: vec3f, t_max: f32, any_hit: bo
     var hit = Hit(t_max, NONE, vec2f(0.0), 0u);
     var stack: array<u32, BVH_STACK>;
     var depth = 0u;
-    var node = select(0u, frame.top_level, scene_has_instances);
+    var node = select(0u, top_level, scene_has_instances);
     // The instance whose bottom level is walked, and the stack's depth when it was entered.
     var instance = select(0u, NONE, scene_has_instances);
     var floor_depth = 0u;
@@ -182,7 +183,7 @@ fn traverse(world_origin: vec3f, world_direction: vec3f, t_max: f32, any_hit: bo
                 origin = instance_point(instance, TO_OBJECT, world_origin);
                 direction = instance_vector(instance, TO_OBJECT, world_direction);
                 inverse = safe_inverse(direction);
-                node = instance_texel(instance, 9u).x;
+                node = instance_texel(instance, 6u).x;
                 continue;
             }
             for (var i = first; i < first + count; i += 1u) {
@@ -217,4 +218,9 @@ fn traverse(world_origin: vec3f, world_direction: vec3f, t_max: f32, any_hit: bo
         node = stack[depth];
     }
     return hit;
+}
+
+// The same in this frame's scene.
+fn traverse(origin: vec3f, direction: vec3f, t_max: f32, any_hit: bool) -> Hit {
+    return traverse_from(frame.top_level, origin, direction, t_max, any_hit);
 }

@@ -33,17 +33,16 @@ fn load_attributes(triangle: u32) -> TriangleAttributes {
 }
 
 fn instance_texel(instance: u32, texel: u32) -> vec4u {
-    return textureLoad(instances, data_texel(instance * 10u + texel), 0);
+    return textureLoad(instances, data_texel(instance * 7u + texel), 0);
 }
 
-// `row` of the matrices of an instance: 0 to 2 world to object, 3 to 5 object to world, 6 to 8 the previous frame's.
+// `row` of the matrices of an instance: 0 to 2 world to object, 3 to 5 object to world.
 fn instance_row(instance: u32, row: u32) -> vec4f {
     return bitcast<vec4f>(instance_texel(instance, row));
 }
 
 const TO_OBJECT = 0u;
 const TO_WORLD = 3u;
-const PREVIOUS_TO_WORLD = 6u;
 
 // A point through one of the matrices.
 fn instance_point(instance: u32, matrix: u32, p: vec3f) -> vec3f {
@@ -65,7 +64,20 @@ fn instance_normal(instance: u32, n: vec3f) -> vec3f {
 }
 
 fn instance_first_light(instance: u32) -> u32 {
-    return instance_texel(instance, 9u).y;
+    return instance_texel(instance, 6u).y;
+}
+
+// An instance of this frame as it was in the previous one.
+fn previous_instance(instance: u32) -> u32 {
+    return select(instance, instance + frame.instance_count, scene_has_motion);
+}
+
+// A triangle of an instance of this frame as it was in the previous one.
+fn previous_triangle(instance: u32, triangle: u32) -> u32 {
+    if !scene_has_motion {
+        return triangle;
+    }
+    return triangle + instance_texel(instance, 6u).z;
 }
 
 fn material_texel(material: u32, texel: u32) -> vec4u {

@@ -173,13 +173,32 @@ fn shadow_margin(instance: u32, triangle: u32, position: vec3f) -> f32 {
     return 2e-6 * max(largest.x, max(largest.y, largest.z));
 }
 
-// What a light sample sends to a point, unshadowed. `previous` asks for the light as it was in the previous frame.
+// By how much the area of an emissive triangle has grown since the previous frame. A sample's point is kept in barycentrics,
+// so that this is the Jacobian of taking it from that frame to this one; 1 for other lights.
+fn light_growth(light: u32) -> f32 {
+    if !scene_has_motion || !scene_has_instances || lights[light].kind != LIGHT_TRIANGLE {
+        return 1.0;
+    }
+    let triangle = lights[light].triangle;
+    let instance = lights[light].instance;
+    let before = triangle_area(previous_instance(instance), previous_triangle(instance, triangle));
+    return select(0.0, triangle_area(instance, triangle) / before, before > 1e-30);
+}
+
+// What a light sample sends to a point, unshadowed. `previous` asks for the light as it was in the previous frame; the
+// measure stays this frame's.
 fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> LightContribution {
     let light = sample.light;
     let kind = lights[light].kind;
     if kind == LIGHT_TRIANGLE {
-        let triangle = lights[light].triangle;
-        let instance = lights[light].instance;
+        var triangle = lights[light].triangle;
+        var instance = lights[light].instance;
+        var growth = 1.0;
+        if previous {
+            growth = light_growth(light);
+            triangle = previous_triangle(instance, triangle);
+            instance = previous_instance(instance);
+        }
         let uv = light_sample_barycentrics(sample);
         let to_light = triangle_point(instance, triangle, uv) - position;
         let distance_2 = dot(to_light, to_light);
@@ -190,11 +209,11 @@ fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> L
             cosine = abs(cosine);
         }
         // Not `cosine <= 0`, which is false for the 0 / 0 of a triangle without area.
-        if !(cosine > 0.0) || distance_2 <= 1e-12 {
+        if !(cosine > 0.0) || distance_2 <= 1e-12 || growth <= 0.0 {
             return LightContribution(direction, distance, vec3f(0.0), 0.0);
         }
         let free = max(distance - shadow_margin(instance, triangle, position) / cosine, 0.0);
-        return LightContribution(direction, free, emitted_radiance(triangle, uv, cosine) * (cosine / distance_2),
+        return LightContribution(direction, free, emitted_radiance(triangle, uv, cosine) * (cosine / distance_2 / growth),
             distance_2 / cosine);
     }
     if scene_has_environment && kind == LIGHT_ENVIRONMENT {
@@ -209,10 +228,11 @@ fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> L
     if !scene_has_punctual_lights {
         return LightContribution(vec3f(0.0, 1.0, 0.0), 0.0, vec3f(0.0), 0.0);
     }
+    let punctual = select(light, lights[light].previous, previous && scene_has_motion);
     if kind == LIGHT_DIRECTIONAL {
-        return LightContribution(-lights[light].direction, ENVIRONMENT_DISTANCE, lights[light].intensity, 0.0);
+        return LightContribution(-lights[punctual].direction, ENVIRONMENT_DISTANCE, lights[light].intensity, 0.0);
     }
-    let to_light = select(lights[light].position, lights[light].previous_position, previous) - position;
+    let to_light = lights[punctual].position - position;
     let distance = length(to_light);
     let direction = to_light / max(distance, 1e-20);
     if distance <= 1e-6 {
@@ -221,7 +241,7 @@ fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> L
     }
     var attenuation = distance_attenuation(light, distance);
     if kind == LIGHT_SPOT {
-        attenuation *= cone_attenuation(light, direction);
+        attenuation *= cone_attenuation(punctual, direction);
     }
     return LightContribution(direction, distance, lights[light].intensity * attenuation, 0.0);
 }

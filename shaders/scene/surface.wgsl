@@ -380,7 +380,12 @@ fn ray_origin(surface: Surface, direction: vec3f) -> vec3f {
 // Whether nothing stands between the surface and the point at `distance` along wi. The ray starts a little off the
 // surface, on the side of wi, and still ends in that point: moved as a whole, it could run into a light before its end.
 fn is_visible(surface: Surface, wi: vec3f, distance: f32) -> bool {
+    return is_visible_from(frame.top_level, surface, wi, distance);
+}
+
+// The same in the scene of a frame, this one's or the previous one's, whose root is `top_level`.
+fn is_visible_from(top_level: u32, surface: Surface, wi: vec3f, distance: f32) -> bool {
     let origin = ray_origin(surface, wi);
     let direction = wi - (origin - surface.position) / max(distance, 1e-12);
-    return traverse(origin, direction, distance, true).triangle == NONE;
+    return traverse_from(top_level, origin, direction, distance, true).triangle == NONE;
 }

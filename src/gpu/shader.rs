@@ -118,6 +118,8 @@ scene_features! {
     punctual_lights,
     /// A top level: more than one mesh that is in world space already.
     instances,
+    /// Anything that moves.
+    motion,
     /// More triangles than one storage binding holds.
     many_triangles,
     /// Any material that transmits light.

@@ -22,6 +22,9 @@ pub struct ExrPicture<'a> {
     pub normal: Option<&'a [[f32; 3]]>,
     /// Distance to the first surface along the view axis in metres: channel `depth.Z`.
     pub depth: Option<&'a [f32]>,
+    /// How far what is seen has moved since the frame before, in pixels, x to the right and y down: channels `motion.X`,
+    /// `motion.Y`.
+    pub motion: Option<&'a [[f32; 2]]>,
     /// Technique id: attribute `restir.technique`.
     pub technique: &'a str,
     /// Every parameter as JSON text: attribute `restir.parameters`.
@@ -66,6 +69,12 @@ pub fn encode_exr(picture: &ExrPicture) -> Result<Vec<u8>> {
     if let Some(depth) = picture.depth {
         check("EXR depth", depth.len())?;
         add("depth.Z", depth.to_vec());
+    }
+    if let Some(motion) = picture.motion {
+        check("EXR motion", motion.len())?;
+        for (i, name) in ["motion.X", "motion.Y"].into_iter().enumerate() {
+            add(name, motion.iter().map(|pair| pair[i]).collect());
+        }
     }
 
     let encoding = Encoding { line_order: LineOrder::Increasing, ..Encoding::SMALL_LOSSLESS };

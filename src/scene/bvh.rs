@@ -58,6 +58,26 @@ pub fn build_top(boxes: &[[Vec3; 2]]) -> Vec<BvhNode> {
     bvh.nodes
 }
 
+/// Makes the boxes of `nodes` fit `triangles` again, after those have moved; the tree stays. Nodes and triangles count from
+/// the bottom level's own first, and children stand after their parent.
+pub fn refit(nodes: &mut [BvhNode], triangles: &[Triangle]) {
+    for i in (0..nodes.len()).rev() {
+        let BvhNode { first, count, .. } = nodes[i];
+        let first = first as usize;
+        let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        if count == 0 {
+            for child in nodes.get(first..first + 2).unwrap_or_default() {
+                (min, max) = (min.min(child.min), max.max(child.max));
+            }
+        } else {
+            for t in triangles.get(first..first + count as usize).unwrap_or_default() {
+                (min, max) = (min.min(t.p0).min(t.p1).min(t.p2), max.max(t.p0).max(t.p1).max(t.p2));
+            }
+        }
+        (nodes[i].min, nodes[i].max) = (min, max);
+    }
+}
+
 /// SAH cost for a ray that hits the root's box: 1 for a node tested, 1 for a triangle tested.
 pub fn cost(nodes: &[BvhNode]) -> f32 {
     let half_area = |node: &BvhNode| {

@@ -141,7 +141,8 @@ pub struct TriangleAttributes {
 }
 
 gpu_struct! {
-/// A bottom-level mesh placed in the world: 160 bytes, ten texels of the data texture `instances`.
+/// A bottom-level mesh placed in the world: 112 bytes, seven texels of the data texture `instances`. In a scene that moves
+/// each has a twin, as many places after it as there are instances: the same as it was in the previous frame.
 ///
 /// The rows of a matrix M are such that component i of `M p` is `dot(row_i, (p, 1))`.
 pub struct Instance {
@@ -149,13 +150,12 @@ pub struct Instance {
     pub to_object: [Vec4; 3],
     /// Object to world.
     pub to_world: [Vec4; 3],
-    /// Object to world in the previous frame.
-    pub previous_to_world: [Vec4; 3],
     /// Index of the bottom level's root in `nodes`.
     pub root: u32,
     /// Index in `lights` of the first of its emissive triangles.
     pub first_light: u32,
-    /// What to add to a triangle's index for its corners in the previous frame; 0 where the mesh does not deform.
+    /// What to add, modulo 2^32, to a triangle's index for the triangle as it was in the previous frame; 0 where the mesh
+    /// does not change its shape.
     pub previous_triangles: u32,
     /// Unused.
     pub padding: u32,
@@ -205,8 +205,8 @@ impl TextureSlot {
     /// Packs a slot. Numbers that do not fit lose their high bits.
     pub fn new(row_u: Vec3, row_v: Vec3, read: &TextureRead) -> Self {
         let TextureRead { array, layer, origin: [x, y], size: [width, height], wrap: [wrap_u, wrap_v], .. } = *read;
-        let place = (x / 8 & 0x3ff)
-            | (y / 8 & 0x3ff) << 10
+        let place = ((x / 8) & 0x3ff)
+            | ((y / 8) & 0x3ff) << 10
             | (layer & 0xff) << 20
             | (array & 3) << 28
             | (read.uv_set & 1) << 30
@@ -227,7 +227,7 @@ impl TextureSlot {
 
     /// What the slot says, or nothing if there is no texture.
     pub fn read(&self) -> Option<TextureRead> {
-        let bits = |word: u32, shift: u32, count: u32| word >> shift & ((1 << count) - 1);
+        let bits = |word: u32, shift: u32, count: u32| (word >> shift) & ((1 << count) - 1);
         let TextureSlot { place, size, .. } = *self;
         self.is_some().then(|| TextureRead {
             array: bits(place, 28, 2),
@@ -385,16 +385,13 @@ pub const LIGHT_ENVIRONMENT: u32 = 4;
 pub const LIGHT_SUN: u32 = 5;
 
 gpu_struct! {
-/// One light with its entry in the alias table: 112 bytes.
+/// One light with its entry in the alias table: 80 bytes. In a scene that moves each punctual light has a twin after all
+/// lights: the same as it was in the previous frame.
 pub struct Light {
     /// World position of a point or spot light.
     pub position: Vec3,
     /// `LIGHT_*`.
     pub kind: u32,
-    /// Where it was in the previous frame.
-    pub previous_position: Vec3,
-    /// Index of the triangle of an emissive triangle.
-    pub triangle: u32,
     /// Unit direction in which a spot, a directional light or the sun shines.
     pub direction: Vec3,
     /// Range in metres; 0 for unlimited.
@@ -411,14 +408,14 @@ pub struct Light {
     pub alias_threshold: f32,
     /// Alias table: the other light of this bucket.
     pub alias_light: u32,
+    /// Index of the triangle of an emissive triangle.
+    pub triangle: u32,
     /// Index of the instance of an emissive triangle.
     pub instance: u32,
+    /// Index of this light as it was in the previous frame: its twin, or itself. Not read of emissive triangles.
+    pub previous: u32,
     /// Unused.
-    pub padding_0: u32,
-    /// Unused.
-    pub padding_1: u32,
-    /// Unused.
-    pub padding_2: u32,
+    pub padding: u32,
 }
 }
 

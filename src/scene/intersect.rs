@@ -92,9 +92,11 @@ pub fn intersect_triangle(triangle: &Triangle, origin: Vec3, direction: Vec3, t_
     let speed = direction.dot(normal).abs();
     let t = p0.dot(normal) / if is_front { -speed } else { speed };
     let hits = (is_front || is_back) && t > 0.0 && t < t_max;
-    // `min` and `max` rather than `clamp`, which does not bear a NaN.
-    let u = (w1 / sum).max(0.0).min(1.0);
-    hits.then_some((t, u, (w2 / sum).max(0.0).min(1.0 - u)))
+    // Only then: `clamp` does not bear the NaN of a triangle without area.
+    hits.then(|| {
+        let u = (w1 / sum).clamp(0.0, 1.0);
+        (t, u, (w2 / sum).clamp(0.0, 1.0 - u))
+    })
 }
 
 /// A primitive that is no triangle: (t, u, v) as `intersect_shape` of `shaders/scene/bvh.wgsl`.

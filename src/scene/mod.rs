@@ -20,12 +20,15 @@ mod material;
 pub mod obj;
 pub mod octahedral;
 pub mod random;
+pub mod rig;
 pub mod shapes;
 pub mod sky;
+pub mod stage;
 pub mod tangents;
 
 pub use flat::FlatScene;
 pub use material::{Anisotropy, Clearcoat, Iridescence, Sheen, Specular, Transmission, Volume};
+pub use rig::Rig;
 
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
@@ -56,8 +59,8 @@ pub struct Scene {
     pub sun: Option<Sun>,
     /// Cameras of the file, in file order; may be empty.
     pub cameras: Vec<Camera>,
-    /// How lights move; empty for a static scene.
-    pub motions: Vec<LightMotion>,
+    /// What moves, and how; the default for a scene that stands still.
+    pub rig: Rig,
     /// What was odd in the file: one line each, for a person. Never printed by this library.
     pub warnings: Vec<String>,
 }
@@ -95,6 +98,28 @@ pub struct Mesh {
     pub indices: Vec<u32>,
     /// Index into [`Scene::materials`].
     pub material: u32,
+    /// How it changes its shape; the default for a mesh that never does.
+    pub deformation: Deformation,
+}
+
+/// How a mesh changes its shape: by joints, by morph targets, or by both.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Deformation {
+    /// What moves each position, one a position; empty for a mesh without a skin.
+    pub influences: Vec<Influence>,
+    /// Morph targets, each with one element a position.
+    pub targets: Vec<Vec<rig::deform::Displacement>>,
+    /// Whether the normals are those of the triangles, and so change with them.
+    pub flat: bool,
+}
+
+/// The joints of a skin that move a vertex.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Influence {
+    /// Indices of joints in their skin.
+    pub joints: [u16; 4],
+    /// How much each moves the vertex; they sum to 1.
+    pub weights: [f32; 4],
 }
 
 /// One mesh placed in the world.
@@ -380,19 +405,6 @@ pub enum Projection {
     },
 }
 
-/// A punctual light revolving round an axis at a constant rate (report `003`, section 3.3).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LightMotion {
-    /// Index into [`Scene::lights`].
-    pub light: u32,
-    /// A point on the axis.
-    pub center: Vec3,
-    /// Unit axis.
-    pub axis: Vec3,
-    /// Radians a second.
-    pub angular_speed: f32,
-}
-
 impl Camera {
     /// A perspective camera at `position` that looks at `target` with +Y up (or +Z where it looks straight up or down).
     pub fn look_at(name: &str, position: Vec3, target: Vec3, vertical_fov: f32) -> Self {
@@ -406,5 +418,25 @@ impl Camera {
             up: right.cross(forward),
             projection: Projection::Perspective { vertical_fov },
         }
+    }
+
+    /// This camera on a node: it looks along the node's -Z with +Y up, made orthonormal. None where the node's transform
+    /// leaves no such pair.
+    pub fn at(&self, to_world: &Mat4) -> Option<Self> {
+        let forward = to_world.transform_vector3(Vec3::NEG_Z).try_normalize()?;
+        let up = to_world.transform_vector3(Vec3::Y).try_normalize()?;
+        let up = up.reject_from_normalized(forward).try_normalize()?;
+        Some(Camera { position: to_world.w_axis.truncate(), forward, up, ..self.clone() })
+    }
+}
+
+impl PunctualLight {
+    /// This light on a node: it shines along the node's -Z. None where the node's transform leaves no direction and the
+    /// light needs one. The node's scale changes neither intensity nor range.
+    pub fn at(&self, to_world: &Mat4) -> Option<Self> {
+        let direction = to_world.transform_vector3(Vec3::NEG_Z).try_normalize();
+        let direction =
+            if self.kind == PunctualKind::Point { Some(direction.unwrap_or(Vec3::NEG_Z)) } else { direction };
+        Some(PunctualLight { position: to_world.w_axis.truncate(), direction: direction?, ..*self })
     }
 }

@@ -117,6 +117,52 @@ test('dragging orbits, and pausing stops', () =>
     assert.notDeepEqual(await readDisplay(page), still);
   }));
 
+test('time runs, stops and can be scrubbed, and the address keeps the moment', () =>
+  withPage('?scene=motion&technique=normals&size=48x32&time=1', async (page) => {
+    await waitForFrames(page, 1);
+    const time = () => page.evaluate(() => window.restir.call((viewer) => viewer.time()));
+    const until = async (what, test) => {
+      for (let tries = 0; tries < 600; tries++) {
+        if (await test()) return;
+        await new Promise((resolve) => setTimeout(resolve, 50));
+      }
+      assert.fail(what);
+    };
+    assert.equal(await page.evaluate(() => document.getElementById('play').getAttribute('aria-pressed')), 'true', 'a scene that moves is played');
+    assert.ok((await time()) >= 1);
+    const first = await time();
+    await until('time runs', async () => (await time()) > first + 0.05);
+
+    // Stopped: frames are averaged, and the moment is in the address.
+    await page.click('#play');
+    await page.waitForFunction(() => /time=1\.\d/.test(location.search) && location.search.includes('accumulate=yes'), { polling: 50 });
+    const stopped = await time();
+    await waitForFrames(page, 3);
+    assert.equal(await time(), stopped);
+
+    // The slider is reached by keyboard.
+    await page.focus('#scrub');
+    await page.keyboard.press('Home');
+    await until('the slider goes to the start', async () => (await time()) === 0);
+    await waitForFrames(page, 1);
+    const start = await readDisplay(page);
+    await page.keyboard.press('End');
+    await page.keyboard.press('ArrowLeft');
+    await until('and back from the end', async () => Math.abs((await time()) - 3.99) < 1e-6);
+    await waitForFrames(page, 1);
+    assert.notDeepEqual(await readDisplay(page), start);
+
+    // A camera that moves is followed from moment to moment.
+    const camera = () => page.evaluate(() => window.restir.call((viewer) => viewer.camera()));
+    await page.select('#camera', '1');
+    await page.waitForFunction(() => location.search.includes('camera=1'), { polling: 50 });
+    await page.evaluate(() => window.restir.call((viewer) => viewer.set_time(1)));
+    await waitForFrames(page, 1);
+    const before = await camera();
+    await page.click('#play');
+    await until('the camera moves', async () => (await camera()) !== before);
+  }));
+
 test('an unknown key in the address is a warning, and the picture appears', () =>
   withPage('?scene=cornell&technique=normals&size=16x16&frames=1&candidatez=3', async (page) => {
     await waitForFrames(page, 1);

@@ -1,12 +1,13 @@
 //! What the GPU tests share: one device a test binary, scenes in small pictures, and statistics.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+pub mod animated;
 pub mod bsdf;
 pub mod extensions;
 pub mod gltf_writer;
 pub mod harness;
+pub mod plants;
 pub mod plate;
-pub mod shader_copy;
 pub mod statistics;
 pub mod twins;
 

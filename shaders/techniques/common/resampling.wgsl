@@ -37,10 +37,11 @@ fn unshadowed_contribution(surface: Surface, sample: LightSample) -> vec3f {
     return surface_scatter(surface, light.direction, light.distance) * light.value;
 }
 
-// V between a surface and a light sample.
+// V between a surface and a light sample, in this frame or, for a surface of the previous one, in that.
 fn sample_is_visible(surface: Surface, sample: LightSample, previous: bool) -> bool {
     let light = light_contribution(sample, surface.position, previous);
-    return is_visible(surface, light.direction, light.distance);
+    let top_level = select(frame.top_level, frame.previous_top_level, previous);
+    return is_visible_from(top_level, surface, light.direction, light.distance);
 }
 
 // The estimate of direct light that a reservoir stands for: f L G V W.

@@ -1,6 +1,8 @@
 // Temporal reuse: the reservoir of the same surface point in the previous frame joins this frame's.
 // One invocation: one pixel. Reads both visibility buffers, this frame's initial reservoirs and the previous frame's
 // final ones. Writes the combined reservoirs.
+// What the previous frame's pixel saw is rebuilt and its shadow rays are traced in the scene as it was then: transforms,
+// shapes, lights and BVH of one frame are kept. So reuse stays unbiased whatever moves.
 // Source: Bitterli et al. 2020, Algorithm 5, lines 8 to 12; thesis 001, section 5.3.1 (rejection by position, normal and
 // albedo); history cap of Bitterli et al. 2020, section 4.2.
 #include "scene/visibility_buffer.wgsl"
@@ -12,19 +14,26 @@
 @group(1) @binding(5) var<storage, read> reservoirs_previous: array<Reservoir>;
 @group(1) @binding(6) var<storage, read_write> reservoirs_out: array<Reservoir>;
 
-// The previous frame's pixel that saw this surface, or (-1, -1).
-fn reproject(surface: Surface) -> vec2i {
-    let film = project(frame.previous_camera, surface.position);
+// Where the point that a pixel sees was in the previous frame.
+fn previous_position(pixel: vec2u) -> vec3f {
+    let seen = textureLoad(visibility, pixel, 0);
+    return triangle_point(previous_instance(seen.x), previous_triangle(seen.x, seen.y), bitcast<vec2f>(seen.zw));
+}
+
+// The previous frame's pixel that saw this point, or (-1, -1) (thesis 000, section 4.2.3).
+fn reproject(position: vec3f) -> vec2i {
+    let film = project(frame.previous_camera, position);
     if any(film < vec2f(0.0)) || any(film >= vec2f(frame.size)) {
         return vec2i(-1);
     }
     return vec2i(film);
 }
 
-fn is_same_surface(surface: Surface, previous: Surface) -> bool {
+// Whether the surface, whose point was at `position`, is the one that was seen there.
+fn is_same_surface(surface: Surface, position: vec3f, previous: Surface) -> bool {
     let distance = length(surface.position - frame.camera.position);
     let albedo_difference = abs(surface.bsdf.base_color - previous.bsdf.base_color);
-    return length(surface.position - previous.position) <= params.temporal_position_threshold * distance
+    return length(position - previous.position) <= params.temporal_position_threshold * distance
         && dot(surface.basis.normal, previous.basis.normal) >= params.temporal_normal_threshold
         && max(albedo_difference.r, max(albedo_difference.g, albedo_difference.b)) <= params.temporal_albedo_threshold;
 }
@@ -33,6 +42,9 @@ fn combine_slot(pixel: vec2u, previous_pixel: vec2u, slot: u32, surface: Surface
     rng: ptr<function, Rng>) {
     let current = reservoirs[reservoir_index(pixel, slot)];
     var history = reservoirs_previous[reservoir_index(previous_pixel, slot)];
+    if history.light != NONE {
+        history.unbiased_contribution_weight *= light_growth(history.light);
+    }
     history.confidence_weight = min(history.confidence_weight, params.history_cap * current.confidence_weight);
     combination_begin();
     combination_offer(current);
@@ -60,7 +72,8 @@ fn reuse_pixel(pixel: vec2u) {
         return;
     }
     let surface = load_pixel(pixel);
-    let reprojected = reproject(surface);
+    let position = previous_position(pixel);
+    let reprojected = reproject(position);
     if reprojected.x < 0 {
         keep(pixel);
         return;
@@ -71,8 +84,9 @@ fn reuse_pixel(pixel: vec2u) {
         keep(pixel);
         return;
     }
-    let previous = load_seen(frame.previous_camera, seen.x, seen.y, bitcast<vec2f>(seen.zw));
-    if !is_same_surface(surface, previous) {
+    // Triangles are numbered for their frame, instances are those of this one.
+    let previous = load_seen(frame.previous_camera, previous_instance(seen.x), seen.y, bitcast<vec2f>(seen.zw));
+    if !is_same_surface(surface, position, previous) {
         keep(pixel);
         return;
     }

@@ -27,9 +27,29 @@ struct Info {
     scenes: Vec<String>,
     variants: Vec<String>,
     moving_lights: usize,
+    moving_instances: usize,
+    moving_cameras: usize,
+    animations: Vec<Animation>,
     /// Lowest and highest corner in metres.
     bounds: [[f32; 3]; 2],
     warnings: Vec<String>,
+}
+
+/// One of the animations that `--animation` takes.
+#[derive(serde::Serialize)]
+struct Animation {
+    name: String,
+    seconds: f32,
+}
+
+impl Animation {
+    fn of(clip: &restir::scene::rig::Clip) -> Self {
+        Animation { name: clip.name.clone(), seconds: clip.duration }
+    }
+
+    fn line(&self) -> String {
+        format!("{} ({:.2} s)", self.name, self.seconds)
+    }
 }
 
 pub fn run(args: &Args) -> Result<()> {
@@ -41,7 +61,10 @@ pub fn run(args: &Args) -> Result<()> {
         cameras: flat.cameras.into_iter().map(|camera| camera.name).collect(),
         scenes: contents.scenes,
         variants: contents.variants,
-        moving_lights: flat.motions.len(),
+        moving_lights: flat.rig.lights.len(),
+        moving_instances: flat.rig.instances.len(),
+        moving_cameras: flat.rig.cameras.len(),
+        animations: flat.rig.clips.iter().map(Animation::of).collect(),
         bounds: flat.bounds.map(|corner| corner.to_array()),
         warnings: flat.warnings,
     };
@@ -62,7 +85,11 @@ fn table(info: &Info) -> String {
         format!("materials  {}", stats.materials),
         format!("textures   {}", stats.textures),
         format!("lights     {} ({} emissive triangles)", stats.lights, stats.emissive_triangles),
-        format!("moving     {} lights", info.moving_lights),
+        format!(
+            "moving     {} instances, {} lights, {} cameras",
+            info.moving_instances, info.moving_lights, info.moving_cameras
+        ),
+        format!("animations {}", info.animations.iter().map(Animation::line).collect::<Vec<_>>().join(", ")),
         format!("cameras    {}", info.cameras.join(", ")),
         format!("scenes     {}", listed(&info.scenes)),
         format!("variants   {}", listed(&info.variants)),

@@ -45,6 +45,18 @@ pub fn seconds(text: &str) -> Result<f64> {
     value.ok_or_else(|| Error::bad_value("seconds", format!("'{text}' is not a number above 0")))
 }
 
+/// A finite number of seconds.
+pub fn time(text: &str) -> Result<f64> {
+    let value = text.parse().ok().filter(|seconds: &f64| seconds.is_finite());
+    value.ok_or_else(|| Error::bad_value("time", format!("'{text}' is not a number of seconds")))
+}
+
+/// Pictures a second: a finite number above 0.
+pub fn rate(text: &str) -> Result<f64> {
+    let value = text.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
+    value.ok_or_else(|| Error::bad_value("animate", format!("'{text}' is not a number of pictures a second above 0")))
+}
+
 /// A picture file to write, by its extension.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
@@ -59,6 +71,17 @@ pub enum Format {
 pub struct OutFile {
     pub path: std::path::PathBuf,
     pub format: Format,
+}
+
+impl OutFile {
+    /// The file of picture `index` of `count`: `picture.png` becomes `picture-0000.png`.
+    pub fn numbered(&self, index: u32, count: u32) -> OutFile {
+        let digits = count.saturating_sub(1).max(1).ilog10() as usize + 1;
+        let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
+        let extension = self.path.extension().unwrap_or_default().to_string_lossy();
+        let name = format!("{stem}-{index:0width$}.{extension}", width = digits.max(4));
+        OutFile { path: self.path.with_file_name(name), format: self.format }
+    }
 }
 
 /// A path that ends in `.png` or `.exr`.

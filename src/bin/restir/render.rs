@@ -6,6 +6,7 @@ use crate::session::{Options, PassReport, Session};
 use crate::{progress, report};
 use pollster::block_on;
 use restir::output::{ExrPicture, check_writable, encode_exr, write_atomic, write_png};
+use restir::renderer::Auxiliary;
 use restir::scene::flat::SceneStats;
 use std::time::Instant;
 
@@ -22,11 +23,16 @@ pub struct Args {
     options: Options,
     #[command(flatten)]
     length: LengthArgs,
+    /// Write a numbered picture for each of --frames moments, this many to a second of scene time, from --time on;
+    /// --spp samples are averaged in each (1 where it is not given).
+    #[arg(long, value_name = "FPS", value_parser = options::rate, conflicts_with_all = ["seconds", "accumulate"])]
+    animate: Option<f64>,
     /// Average all frames, with everything that moves held still; `no` keeps the last frame alone and lets things move.
     /// Without this: `yes`, but `no` for a scene in which something moves.
     #[arg(long, value_name = "yes|no")]
     accumulate: Option<YesNo>,
-    /// The file to write, .png or .exr; replaced only when the whole picture is there.
+    /// The file to write, .png or .exr; replaced only when the whole picture is there. With --animate the pictures are
+    /// numbered: picture.png becomes picture-0000.png and so on.
     #[arg(long, value_name = "FILE", value_parser = options::out_file)]
     out: OutFile,
     /// Print a JSON report: scene, times of each pass, counters, warnings.
@@ -35,13 +41,12 @@ pub struct Args {
 }
 
 #[derive(clap::Args)]
-#[group(multiple = false)]
 struct LengthArgs {
-    /// Frames to render; 16 where nothing else is asked for.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Frames to render, or pictures of an animation; 16 where nothing else is asked for.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "seconds")]
     frames: Option<u32>,
     /// Samples a pixel to accumulate.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "seconds")]
     spp: Option<u32>,
     /// Render until this many seconds have passed.
     #[arg(long, value_name = "T", value_parser = options::seconds)]
@@ -60,6 +65,8 @@ struct Report<'a> {
     scene: &'a str,
     stats: &'a SceneStats,
     camera: &'a str,
+    /// Moment of the last picture in seconds.
+    time: f64,
     technique: &'a str,
     parameters: serde_json::Value,
     size: [u32; 2],
@@ -86,16 +93,22 @@ struct Counters {
 
 pub fn run(args: &Args) -> Result<()> {
     let length = length(args)?;
-    check_writable(&args.out.path)?;
+    let first = if args.animate.is_some() { args.out.numbered(0, args.pictures()) } else { args.out.clone() };
+    check_writable(&first.path)?;
     let mut session = Session::open(&args.scene, &args.options)?;
-    let accumulate =
-        args.accumulate.map_or(args.length.spp.is_some() || !session.moving, |choice| choice == YesNo::Yes);
+    let by_default = args.length.spp.is_some() || args.animate.is_some() || !session.moving;
+    let accumulate = args.accumulate.map_or(by_default, |choice| choice == YesNo::Yes);
     session.renderer.set_accumulate(accumulate);
 
     let start = Instant::now();
-    let frames = render(&mut session, length)?;
+    let frames = match args.animate {
+        Some(rate) => animate(&mut session, args, rate)?,
+        None => render(&mut session, length)?,
+    };
     let seconds = start.elapsed().as_secs_f64();
-    write(&mut session, args, frames)?;
+    if args.animate.is_none() {
+        write(&mut session, args, &args.out, None, frames)?;
+    }
 
     let counters = block_on(session.renderer.counters())?;
     let broken = counters.nan + counters.inf;
@@ -103,7 +116,7 @@ pub fn run(args: &Args) -> Result<()> {
         session.warnings.push(format!("{broken} samples were not finite and were left out"));
         report::warnings(session.warnings.last());
     }
-    let out = args.out.path.display().to_string();
+    let out = first.path.display().to_string();
     if !args.json {
         let size = args.options.size;
         return report::text(&format!(
@@ -116,6 +129,7 @@ pub fn run(args: &Args) -> Result<()> {
         scene: &session.scene,
         stats: &session.stats,
         camera: &session.camera,
+        time: session.renderer.time(),
         technique: &args.options.technique,
         parameters: session.renderer.parameters(),
         size: args.options.size.to_array(),
@@ -130,7 +144,17 @@ pub fn run(args: &Args) -> Result<()> {
     })
 }
 
+impl Args {
+    /// Pictures of an animation.
+    fn pictures(&self) -> u32 {
+        self.length.frames.unwrap_or(DEFAULT_FRAMES)
+    }
+}
+
 fn length(args: &Args) -> Result<Length> {
+    if args.animate.is_none() && args.length.spp.is_some() && args.length.frames.is_some() {
+        return Err(Failure::usage("--spp", "it is how many frames are averaged, as --frames: give one of them"));
+    }
     if args.length.spp.is_some() && args.accumulate == Some(YesNo::No) {
         return Err(Failure::usage("--spp", "samples are accumulated, which --accumulate no forbids; use --frames"));
     }
@@ -168,21 +192,45 @@ fn render(session: &mut Session, length: Length) -> Result<u32> {
     }
 }
 
-fn write(session: &mut Session, args: &Args, frames: u32) -> Result<()> {
+/// Renders and writes the pictures of an animation; returns how many frames they took. Time stands still while the samples
+/// of a picture are taken, and the technique keeps its history from picture to picture.
+fn animate(session: &mut Session, args: &Args, rate: f64) -> Result<u32> {
+    let (pictures, samples) = (args.pictures(), args.length.spp.unwrap_or(1));
+    let bar = progress::bar(pictures.into()).with_message("pictures");
+    for picture in 0..pictures {
+        session.renderer.set_time(args.options.time + f64::from(picture) / rate);
+        let mut auxiliary = None;
+        for sample in 0..samples {
+            session.measured_frame()?;
+            // Motion is that from picture to picture: the later samples have seen nothing move.
+            if sample == 0 && args.out.format == Format::Exr {
+                auxiliary = Some(block_on(session.renderer.read_auxiliary())?);
+            }
+        }
+        write(session, args, &args.out.numbered(picture, pictures), auxiliary, samples)?;
+        bar.set_position(u64::from(picture) + 1);
+    }
+    bar.finish_and_clear();
+    Ok(pictures.saturating_mul(samples))
+}
+
+fn write(session: &mut Session, args: &Args, file: &OutFile, auxiliary: Option<Auxiliary>, frames: u32) -> Result<()> {
     let renderer = &mut session.renderer;
-    let OutFile { path, format } = &args.out;
+    let OutFile { path, format } = file;
     match format {
         Format::Png => {
             let size = args.options.size;
             write_png(path, size.x, size.y, &block_on(renderer.read_display())?)?;
         }
         Format::Exr => {
-            let (image, auxiliary) = (block_on(renderer.read_image())?, block_on(renderer.read_auxiliary())?);
+            let image = block_on(renderer.read_image())?;
+            let auxiliary = auxiliary.map_or_else(|| block_on(renderer.read_auxiliary()), Ok)?;
             let picture = ExrPicture {
                 image: &image,
                 albedo: Some(&auxiliary.albedo),
                 normal: Some(&auxiliary.normal),
                 depth: Some(&auxiliary.depth),
+                motion: Some(&auxiliary.motion),
                 technique: &args.options.technique,
                 parameters: &renderer.parameters().to_string(),
                 seed: args.options.seed,

@@ -122,11 +122,11 @@ fn flatten(scene: &Scene) -> Result<FlatScene> {
     Ok(flat?)
 }
 
-/// The camera of an index or a name; the first where none is asked for.
-pub fn camera<'a>(cameras: &'a [Camera], wanted: Option<&str>) -> Result<&'a Camera> {
+/// The index of the camera of an index or a name; the first where none is asked for.
+pub fn camera(cameras: &[Camera], wanted: Option<&str>) -> Result<usize> {
     let wanted = wanted.unwrap_or("0");
-    let by_index = wanted.parse().ok().and_then(|index: usize| cameras.get(index));
-    by_index.or_else(|| cameras.iter().find(|camera| camera.name == wanted)).ok_or_else(|| {
+    let by_index = wanted.parse().ok().filter(|&index: &usize| index < cameras.len());
+    by_index.or_else(|| cameras.iter().position(|camera| camera.name == wanted)).ok_or_else(|| {
         let known = cameras.iter().enumerate().map(|(index, camera)| format!("{index} ({})", camera.name));
         Failure::Usage(Error::Unknown {
             kind: "camera",

@@ -29,6 +29,12 @@ pub struct Options {
     /// Camera of the scene, by index or name; the first where none is given.
     #[arg(long, value_name = "INDEX|NAME")]
     pub camera: Option<String>,
+    /// Moment of the scene in seconds: where it stands still, or begins to move.
+    #[arg(long, value_name = "T", default_value_t = 0.0, value_parser = options::time, allow_negative_numbers = true)]
+    pub time: f64,
+    /// Animation of the scene to play, by name or index; the first where none is given.
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub animation: Option<String>,
     /// Longest path in scattering events: 1 is direct light only. Lights seen directly are always drawn.
     #[arg(long, value_name = "N", value_parser = options::max_depth)]
     pub max_depth: Option<u32>,
@@ -78,11 +84,12 @@ impl Session {
         }
         let flat = scene::open(name, &options.choice, Some((&options.lighting, options.seed)))?;
         report::warnings(&flat.warnings);
-        let camera = scene::camera(&flat.cameras, options.camera.as_deref())?.clone();
+        let camera = scene::camera(&flat.cameras, options.camera.as_deref())?;
+        let camera_name = flat.cameras.get(camera).map(|camera| camera.name.clone()).unwrap_or_default();
         let (scene, stats, warnings) = (flat.name.clone(), flat.stats.clone(), flat.warnings.clone());
         let turns =
             options.set.iter().any(|(key, value)| key == TURN && value.parse::<f32>().is_ok_and(|rate| rate != 0.0));
-        let moving = turns || !flat.motions.is_empty();
+        let moving = turns || !flat.rig.is_still();
 
         let gpu = block_on(Gpu::headless(&GpuOptions { default_limits: false }))?;
         let adapter = gpu.adapter_name();
@@ -94,13 +101,17 @@ impl Session {
         for (key, value) in &options.set {
             renderer.set(key, value).map_err(Failure::from_option)?;
         }
-        renderer.set_camera(&camera);
+        if let Some(animation) = &options.animation {
+            renderer.set_animation(animation).map_err(Failure::from_option)?;
+        }
+        renderer.set_time(options.time);
         renderer.set_seed(options.seed);
+        renderer.follow_camera(camera)?;
         Ok(Session {
             renderer,
             adapter,
             scene,
-            camera: camera.name,
+            camera: camera_name,
             stats,
             moving,
             warnings,

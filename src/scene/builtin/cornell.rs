@@ -1,7 +1,8 @@
 //! The Cornell box, a metre a side, and the same with revolving point lights.
 
 use super::{matte, place};
-use crate::scene::{Camera, LightMotion, Material, Mesh, PunctualKind, PunctualLight, Scene, shapes};
+use crate::scene::rig::{Attachment, Node, Spin};
+use crate::scene::{Camera, Material, Mesh, PunctualKind, PunctualLight, Scene, shapes};
 use glam::{Mat4, Vec3};
 use std::f32::consts::TAU;
 
@@ -87,18 +88,17 @@ pub(super) fn cornell_64() -> Scene {
     let count = RINGS.len() * LIGHTS_PER_RING;
     let intensity = area_flux.element_sum() / 3.0 / (4.0 * std::f32::consts::PI) / count as f32;
     for (r, ring) in RINGS.iter().enumerate() {
+        let hub = scene.rig.add_node(Node::default());
+        scene.rig.spins.push(Spin { axis: Vec3::Y, angular_speed: ring.speed, node: hub });
         for i in 0..LIGHTS_PER_RING {
             let turn = (i as f32 + 0.25 * r as f32) / LIGHTS_PER_RING as f32;
             let (sin, cos) = (turn * TAU).sin_cos();
-            scene.motions.push(LightMotion {
-                light: scene.lights.len() as u32,
-                center: Vec3::ZERO,
-                axis: Vec3::Y,
-                angular_speed: ring.speed,
-            });
+            let position = Vec3::new(ring.radius * sin, ring.height, ring.radius * cos);
+            let node = scene.rig.add_node(Node { parent: hub, translation: position, ..Node::default() });
+            scene.rig.lights.push(Attachment { target: scene.lights.len() as u32, node });
             scene.lights.push(PunctualLight {
                 kind: PunctualKind::Point,
-                position: Vec3::new(ring.radius * sin, ring.height, ring.radius * cos),
+                position,
                 direction: Vec3::NEG_Z,
                 intensity: super::hue(5.0 * turn + 0.25 * r as f32) * (2.0 * intensity),
                 range: f32::INFINITY,

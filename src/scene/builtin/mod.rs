@@ -6,6 +6,7 @@ mod furnace;
 mod glossy_spheres;
 mod many_lights;
 mod materials;
+mod motion;
 mod veach_mis;
 
 use super::{Instance, Material, Mesh, Scene, shapes};
@@ -82,6 +83,12 @@ pub const ALL: &[BuiltinInfo] = &[
         doc: "A few things on a floor under a sphere, a rectangle and a disk of light.",
         example: "area-lights",
     },
+    BuiltinInfo {
+        name: "motion",
+        title: "Everything that moves",
+        doc: "A column bent by its skin, a ball that morphs, a box, a lamp, a light and a camera that move, in a loop of 4 seconds.",
+        example: "motion",
+    },
 ];
 
 /// Makes a built-in scene; the same name gives the same scene.
@@ -103,6 +110,7 @@ pub fn make(name: &str) -> Result<Scene> {
         "area-lights" => Ok(area_lights::area_lights()),
         "glossy-spheres" => Ok(glossy_spheres::glossy_spheres()),
         "materials" => Ok(materials::materials()),
+        "motion" => Ok(motion::motion()),
         _ => Err(Error::Unknown {
             kind: "built-in scene",
             name: name.to_owned(),

@@ -4,10 +4,11 @@
 //! the texture arrays and the environment, each beginning
 //! at a multiple of 16. Little-endian throughout.
 
-use super::{FlatEnvironment, FlatScene, SceneStats, TextureArray, validate};
+use super::{Deformers, FlatEnvironment, FlatScene, SceneStats, TextureArray, validate};
 use crate::error::{Error, Result};
 use crate::pace::{Pace, SLICE_BYTES};
-use crate::scene::{Camera, LightMotion, Projection};
+use crate::scene::rig::bytes as rig_bytes;
+use crate::scene::{Camera, Projection, Rig};
 use bytemuck::Pod;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -16,7 +17,7 @@ const _: () = assert!(cfg!(target_endian = "little"), "arrays are copied as they
 
 const MAGIC: [u8; 4] = *b"RSTR";
 /// Of the layout: to be raised by each change to the header, the arrays or their elements.
-pub(super) const VERSION: u32 = 3;
+pub(super) const VERSION: u32 = 4;
 const PREFIX: usize = 16;
 const ALIGNMENT: usize = 16;
 
@@ -25,7 +26,7 @@ const ALIGNMENT: usize = 16;
 struct Header {
     name: String,
     first_punctual: u32,
-    motions: Vec<MotionRecord>,
+    rig: rig_bytes::Header,
     cameras: Vec<CameraRecord>,
     bounds: [[f32; 3]; 2],
     stats: SceneStats,
@@ -47,6 +48,10 @@ struct Sections {
     material_extensions: usize,
     lights: usize,
     environment_texels: usize,
+    deformers: usize,
+    deformer_vertices: usize,
+    displacements: usize,
+    corners: usize,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -56,14 +61,6 @@ struct TextureRecord {
     layers: u32,
     levels: u32,
     bytes: usize,
-}
-
-#[derive(Serialize, Deserialize)]
-struct MotionRecord {
-    light: u32,
-    center: [f32; 3],
-    axis: [f32; 3],
-    angular_speed: f32,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -112,6 +109,12 @@ impl FlatScene {
             sections.push(bytemuck::cast_slice(&environment.radiance));
             sections.push(bytemuck::cast_slice(&environment.alias));
         }
+        sections.extend(self.rig.arrays());
+        let deformers = &self.deformers;
+        sections.push(bytemuck::cast_slice(&deformers.list));
+        sections.push(bytemuck::cast_slice(&deformers.vertices));
+        sections.push(bytemuck::cast_slice(&deformers.displacements));
+        sections.push(bytemuck::cast_slice(&deformers.corners));
         sections
     }
 
@@ -132,6 +135,12 @@ impl FlatScene {
             sections.push(bytemuck::cast_slice_mut(&mut environment.radiance));
             sections.push(bytemuck::cast_slice_mut(&mut environment.alias));
         }
+        sections.extend(self.rig.arrays_mut());
+        let deformers = &mut self.deformers;
+        sections.push(bytemuck::cast_slice_mut(&mut deformers.list));
+        sections.push(bytemuck::cast_slice_mut(&mut deformers.vertices));
+        sections.push(bytemuck::cast_slice_mut(&mut deformers.displacements));
+        sections.push(bytemuck::cast_slice_mut(&mut deformers.corners));
         sections
     }
 
@@ -203,6 +212,10 @@ impl FlatScene {
             material_extensions,
             lights,
             environment_texels,
+            deformers,
+            deformer_vertices,
+            displacements,
+            corners,
         } = header.sections;
         let scene = FlatScene {
             name: header.name,
@@ -215,7 +228,6 @@ impl FlatScene {
             material_extensions: reader.array(material_extensions, "material extensions")?,
             lights: reader.array(lights, "lights")?,
             first_punctual: header.first_punctual,
-            motions: header.motions.into_iter().map(MotionRecord::into_motion).collect(),
             textures: header.textures.into_iter().map(|array| array.read(&mut reader)).collect::<Result<_>>()?,
             environment: match header.environment {
                 Some([width, height]) => Some(FlatEnvironment {
@@ -225,6 +237,13 @@ impl FlatScene {
                     alias: reader.array(environment_texels, "environment")?,
                 }),
                 None => None,
+            },
+            rig: Rig::from_arrays(header.rig, &mut reader)?,
+            deformers: Deformers {
+                list: reader.array(deformers, "deformers")?,
+                vertices: reader.array(deformer_vertices, "deformers.vertices")?,
+                displacements: reader.array(displacements, "deformers.displacements")?,
+                corners: reader.array(corners, "deformers.corners")?,
             },
             cameras: header.cameras.into_iter().map(CameraRecord::into_camera).collect(),
             bounds: header.bounds.map(Vec3::from_array),
@@ -277,13 +296,13 @@ impl<'a> Reader<'a> {
     }
 }
 
+impl rig_bytes::TakeArray for Reader<'_> {
+    fn take_array<T: Pod>(&mut self, count: usize, place: &str) -> Result<Vec<T>> {
+        self.array(count, place)
+    }
+}
+
 fn header_of(scene: &FlatScene) -> Header {
-    let motions = scene.motions.iter().map(|motion| MotionRecord {
-        light: motion.light,
-        center: motion.center.to_array(),
-        axis: motion.axis.to_array(),
-        angular_speed: motion.angular_speed,
-    });
     let cameras = scene.cameras.iter().map(|camera| {
         let (orthographic, extent) = match camera.projection {
             Projection::Perspective { vertical_fov } => (false, vertical_fov),
@@ -301,7 +320,7 @@ fn header_of(scene: &FlatScene) -> Header {
     Header {
         name: scene.name.clone(),
         first_punctual: scene.first_punctual,
-        motions: motions.collect(),
+        rig: scene.rig.header(),
         cameras: cameras.collect(),
         bounds: scene.bounds.map(|corner| corner.to_array()),
         stats: scene.stats.clone(),
@@ -318,6 +337,10 @@ fn header_of(scene: &FlatScene) -> Header {
             material_extensions: scene.material_extensions.len(),
             lights: scene.lights.len(),
             environment_texels: scene.environment.as_ref().map_or(0, |e| e.radiance.len()),
+            deformers: scene.deformers.list.len(),
+            deformer_vertices: scene.deformers.vertices.len(),
+            displacements: scene.deformers.displacements.len(),
+            corners: scene.deformers.corners.len(),
         },
     }
 }
@@ -331,17 +354,6 @@ impl TextureRecord {
     fn read(self, reader: &mut Reader) -> Result<TextureArray> {
         let TextureRecord { width, height, layers, levels, bytes } = self;
         Ok(TextureArray { width, height, layers, levels, texels: reader.array(bytes, "textures")? })
-    }
-}
-
-impl MotionRecord {
-    fn into_motion(self) -> LightMotion {
-        LightMotion {
-            light: self.light,
-            center: Vec3::from_array(self.center),
-            axis: Vec3::from_array(self.axis),
-            angular_speed: self.angular_speed,
-        }
     }
 }
 

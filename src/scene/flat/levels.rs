@@ -1,11 +1,12 @@
 //! The two levels: which meshes are merged, which keep a bottom level of their own, and where those stand.
 
 use super::triangles::{self, Soup};
-use super::{FlatInstance, FlatMesh};
+use super::{Deformer, Deformers, FlatInstance, FlatMesh};
 use crate::error::{Error, Result};
 use crate::scene::bvh::{self, Bvh};
 use crate::scene::gpu_types::{BvhNode, NONE, Triangle, TriangleAttributes};
-use crate::scene::{MAX_TRIANGLES, Scene};
+use crate::scene::rig::{self, Motion, Pose};
+use crate::scene::{MAX_TRIANGLES, Rig, Scene};
 use glam::{Mat3, Mat4, Vec3, Vec4};
 
 /// How often progress is told at most.
@@ -23,6 +24,10 @@ pub(super) struct Levels {
     pub attributes: Vec<TriangleAttributes>,
     pub meshes: Vec<FlatMesh>,
     pub instances: Vec<FlatInstance>,
+    /// The meshes that change their shape.
+    pub deformers: Deformers,
+    /// The scene's rig, with instances of this scene.
+    pub rig: Rig,
     /// Triangles left out.
     pub dropped: u64,
     /// Longest path through both levels, in nodes.
@@ -35,30 +40,47 @@ struct Group {
     mesh: u32,
     /// Indices into [`Scene::instances`]: where it stands, or what is merged.
     instances: Vec<u32>,
+    /// Index in the rig's instances of the one whose shape this is, if it changes.
+    deforming: Option<u32>,
 }
 
-/// Merges what never moves and stands in one place, and gives every other mesh a bottom level of its own.
+/// Merges what never moves and stands in one place, and gives every other mesh a bottom level of its own; each instance
+/// whose mesh changes its shape has one for itself.
 fn groups(scene: &Scene) -> Result<Vec<Group>> {
+    let moving = scene.rig.moving_nodes();
+    let mut motions = vec![(Motion::Still, 0); scene.instances.len()];
+    for (i, placement) in scene.rig.instances.iter().enumerate() {
+        if let Some(motion) = motions.get_mut(placement.instance as usize) {
+            *motion = (scene.rig.motion(placement, &moving), i as u32);
+        }
+    }
     let mut uses: Vec<Vec<u32>> = vec![Vec::new(); scene.meshes.len()];
     for (i, instance) in scene.instances.iter().enumerate() {
         let missing = || Error::bad_value(format!("instance {i}"), format!("there is no mesh {}", instance.mesh));
         uses.get_mut(instance.mesh as usize).ok_or_else(missing)?.push(i as u32);
     }
-    let mut merged = Group { mesh: NONE, instances: Vec::new() };
+    let mut merged = Group { mesh: NONE, instances: Vec::new(), deforming: None };
     let mut own = Vec::new();
     let mut total = 0u64;
-    for (mesh, uses) in uses.into_iter().enumerate() {
+    for (mesh, mut uses) in uses.into_iter().enumerate() {
         let triangles = scene.meshes[mesh].indices.len() as u64 / 3;
+        for instance in uses.extract_if(.., |&mut i| motions[i as usize].0 == Motion::Deforming) {
+            let deforming = Some(motions[instance as usize].1);
+            own.push(Group { mesh: mesh as u32, instances: vec![instance], deforming });
+            total += triangles;
+        }
+        let rigid: Vec<u32> = uses.extract_if(.., |&mut i| motions[i as usize].0 == Motion::Rigid).collect();
         let is_shared = triangles >= MIN_SHARED && uses.len().saturating_sub(1) as u64 * triangles >= MIN_SAVED;
         let (mut stays, mut moves) = (uses, Vec::new());
         // What cannot be undone cannot have a space of its own.
         if is_shared {
             (moves, stays) = stays.into_iter().partition(|&i| is_invertible(scene.instances[i as usize].transform));
         }
+        moves.extend(rigid);
         total += stays.len() as u64 * triangles + if moves.is_empty() { 0 } else { triangles };
         merged.instances.extend(stays);
         if !moves.is_empty() {
-            own.push(Group { mesh: mesh as u32, instances: moves });
+            own.push(Group { mesh: mesh as u32, instances: moves, deforming: None });
         }
     }
     if total > MAX_TRIANGLES {
@@ -85,14 +107,20 @@ pub(crate) fn is_invertible(transform: Mat4) -> bool {
 
 /// Builds the bottom levels and the top level over them.
 pub(super) fn build(scene: &Scene, progress: &mut dyn FnMut(f32, &str)) -> Result<Levels> {
+    let counts =
+        rig::Counts { instances: scene.instances.len(), lights: scene.lights.len(), cameras: scene.cameras.len() };
+    scene.rig.check(counts).map_err(|(place, what)| Error::bad_value(place, what))?;
     let groups = groups(scene)?;
     triangles::check_all(scene)?;
+    let pose = scene.rig.pose(0, 0.0);
     let mut levels = Levels {
         nodes: Vec::new(),
         triangles: Vec::new(),
         attributes: Vec::new(),
         meshes: Vec::new(),
         instances: Vec::new(),
+        deformers: Deformers::default(),
+        rig: scene.rig.clone(),
         dropped: 0,
         depth: 0,
     };
@@ -110,12 +138,17 @@ pub(super) fn build(scene: &Scene, progress: &mut dyn FnMut(f32, &str)) -> Resul
                 let instance = &scene.instances[index as usize];
                 soup.add(scene, &scene.meshes[instance.mesh as usize], instance.transform);
             }
+        } else if let Some(placement) = group.deforming {
+            soup = levels.deforming(scene, group, placement, &pose);
         } else {
             soup.add(scene, &scene.meshes[group.mesh as usize], Mat4::IDENTITY);
         }
         report(0.3, "building the BVH");
         levels.add(scene, group, soup);
     }
+    levels.follow(&pose);
+    let triangles: Vec<u32> = levels.meshes.iter().map(|mesh| mesh.triangles).collect();
+    levels.deformers.check(&triangles, &levels.rig.instances).map_err(|(place, what)| Error::bad_value(place, what))?;
     let root_boxes: Vec<[Vec3; 2]> = levels.instances.iter().map(|i| levels.box_of(i)).collect();
     if levels.has_top() {
         let top = top_level(&root_boxes, levels.nodes.len() as u32);
@@ -131,6 +164,55 @@ impl Levels {
         !matches!(&self.meshes[..], [only] if only.source == NONE)
     }
 
+    /// The triangles of an instance whose mesh changes its shape, as it is in `pose`; its vertices and displacements are kept.
+    fn deforming(&mut self, scene: &Scene, group: &Group, index: u32, pose: &Pose) -> Soup {
+        let mesh = &scene.meshes[group.mesh as usize];
+        let placement = &scene.rig.instances[index as usize];
+        let joints = pose.joint_matrices(&scene.rig, placement.skin);
+        let shaped = mesh.shaped(pose.morph_weights(placement), &joints);
+        let deformers = &mut self.deformers;
+        deformers.list.push(Deformer {
+            placement: index,
+            mesh: self.meshes.len() as u32,
+            first_vertex: deformers.vertices.len() as u32,
+            vertex_count: mesh.positions.len() as u32,
+            first_displacement: deformers.displacements.len() as u32,
+            first_corners: deformers.corners.len() as u32,
+            flat: mesh.deformation.flat.into(),
+        });
+        deformers.vertices.extend(mesh.vertices());
+        // A mesh may have fewer targets than its node has weights.
+        for target in 0..placement.weight_count as usize {
+            let target = mesh.deformation.targets.get(target).map_or(&[][..], |target| target);
+            let missing = mesh.positions.len() - target.len().min(mesh.positions.len());
+            deformers.displacements.extend(target.iter().take(mesh.positions.len()));
+            deformers.displacements.extend(std::iter::repeat_n(rig::deform::Displacement::default(), missing));
+        }
+        Soup::of_deforming(scene, &shaped)
+    }
+
+    /// Puts the rig's instances where `pose` has them, and has the rig name instances of this scene.
+    fn follow(&mut self, pose: &Pose) {
+        let mut of_source = std::collections::HashMap::new();
+        for (i, instance) in self.instances.iter().enumerate() {
+            of_source.insert(instance.source, i as u32);
+        }
+        // Everything that moves has an instance of its own; what was merged is the rig's no longer.
+        let mut kept = Vec::new();
+        let mut numbers = vec![NONE; self.rig.instances.len()];
+        for (placement, number) in self.rig.instances.iter().zip(&mut numbers) {
+            if let Some(&instance) = of_source.get(&placement.instance) {
+                self.instances[instance as usize].transform = pose.instance(placement);
+                *number = kept.len() as u32;
+                kept.push(rig::Placement { instance, ..*placement });
+            }
+        }
+        self.rig.instances = kept;
+        for deformer in &mut self.deformers.list {
+            deformer.placement = numbers[deformer.placement as usize];
+        }
+    }
+
     fn add(&mut self, scene: &Scene, group: &Group, mut soup: Soup) {
         self.dropped += soup.dropped;
         if soup.triangles.is_empty() {
@@ -138,6 +220,7 @@ impl Levels {
             soup.attributes.push(bytemuck::Zeroable::zeroed());
         }
         let Bvh { nodes, order, depth } = bvh::build(&soup.triangles);
+        self.deformers.corners.extend(order.iter().filter_map(|&i| soup.corners.get(i as usize)));
         let (first_node, first_triangle) = (self.nodes.len() as u32, self.triangles.len() as u32);
         self.depth = self.depth.max(depth);
         self.nodes.extend(nodes.iter().map(|node| {

@@ -147,7 +147,6 @@ fn flatten(light: &PunctualLight) -> Light {
     };
     Light {
         position: light.position,
-        previous_position: light.position,
         direction: light.direction.try_normalize().unwrap_or(Vec3::NEG_Z),
         range: if light.range.is_finite() { light.range.max(0.0) } else { 0.0 },
         intensity: light.intensity,

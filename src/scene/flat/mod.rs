@@ -2,6 +2,7 @@
 
 mod bytes;
 pub mod cooked;
+pub mod deformers;
 mod emission;
 pub(crate) mod environment;
 mod extensions;
@@ -15,11 +16,12 @@ mod textures;
 mod triangles;
 mod validate;
 
+pub use deformers::{Deformer, Deformers};
 pub use environment::FlatEnvironment;
 pub(super) use triangles::face_normal;
 
 use super::gpu_types::{BvhNode, Light, Material, MaterialExtensions, NONE, Triangle, TriangleAttributes};
-use super::{Camera, LightMotion, MAX_COORDINATE, Projection, PunctualKind, Scene, bvh};
+use super::{Camera, MAX_COORDINATE, Projection, PunctualKind, Rig, Scene, bvh, rig};
 use crate::error::{Error, Result};
 use glam::{Mat4, Vec3};
 
@@ -128,7 +130,7 @@ pub struct FlatMesh {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct FlatInstance {
-    /// Object to world, at rest.
+    /// Object to world, at time 0 of the first animation.
     pub transform: Mat4,
     /// Index into [`FlatScene::meshes`].
     pub mesh: u32,
@@ -164,8 +166,10 @@ pub struct FlatScene {
     pub lights: Vec<Light>,
     /// Index in `lights` of the first punctual light; they follow in the order of [`Scene::lights`].
     pub first_punctual: u32,
-    /// How punctual lights move; `light` counts from `first_punctual`.
-    pub motions: Vec<LightMotion>,
+    /// What moves; its instances and cameras are those of this scene, its lights count from `first_punctual`.
+    pub rig: Rig,
+    /// The meshes that change their shape.
+    pub deformers: Deformers,
     /// The images that materials read; at most four arrays, none in a scene without textures.
     pub textures: Vec<TextureArray>,
     /// Light from infinitely far away.
@@ -189,7 +193,8 @@ impl FlatScene {
     pub fn build(scene: &Scene, progress: &mut dyn FnMut(f32, &str)) -> Result<Self> {
         let mut warnings = scene.warnings.clone();
         let geometry = levels::build(scene, &mut |fraction, what| progress(0.8 * fraction, what))?;
-        let levels::Levels { nodes, mut triangles, attributes, meshes, mut instances, dropped, depth } = geometry;
+        let levels::Levels { nodes, mut triangles, attributes, meshes, mut instances, deformers, rig, dropped, depth } =
+            geometry;
         if dropped > 0 {
             warnings.push(format!("{dropped} triangles without area or with unusable positions were left out"));
         }
@@ -214,11 +219,6 @@ impl FlatScene {
         let emitters = lights::emitters(&mut triangles, &meshes, &mut instances, &attributes, &emission);
         let (lights, first_punctual) =
             lights::build(emitters, &scene.lights, scene.sun.as_ref(), environment.is_some())?;
-        for motion in &scene.motions {
-            if motion.light as usize >= scene.lights.len() {
-                return Err(Error::bad_value("light motion", format!("there is no light {}", motion.light)));
-            }
-        }
 
         let root = if has_top(&meshes) { nodes.len() + 1 - 2 * instances.len() } else { 0 };
         let bounds = bounds(nodes.get(root), scene);
@@ -236,12 +236,16 @@ impl FlatScene {
             material_extensions,
             lights,
             first_punctual,
-            motions: scene.motions.clone(),
+            rig,
+            deformers,
             textures,
             environment,
             warnings: Vec::new(),
         };
-        flat.cameras = cameras(scene, &flat, &mut warnings);
+        flat.cameras = cameras(scene, &mut flat, &mut warnings);
+        let counts =
+            rig::Counts { instances: flat.instances.len(), lights: scene.lights.len(), cameras: flat.cameras.len() };
+        flat.rig.check(counts).map_err(|(place, what)| Error::bad_value(place, what))?;
         flat.warnings = warnings;
         flat.stats = SceneStats {
             triangles: flat.triangle_count(),
@@ -312,7 +316,7 @@ fn bounds(root: Option<&BvhNode>, scene: &Scene) -> [Vec3; 2] {
 }
 
 /// The scene's usable cameras, or one that shows it from inside or outside.
-fn cameras(scene: &Scene, flat: &FlatScene, warnings: &mut Vec<String>) -> Vec<Camera> {
+fn cameras(scene: &Scene, flat: &mut FlatScene, warnings: &mut Vec<String>) -> Vec<Camera> {
     let usable = |camera: &&Camera| {
         let extent = match camera.projection {
             Projection::Perspective { vertical_fov } => vertical_fov,
@@ -321,7 +325,13 @@ fn cameras(scene: &Scene, flat: &FlatScene, warnings: &mut Vec<String>) -> Vec<C
         let right = camera.forward.cross(camera.up);
         camera.position.is_finite() && right.is_finite() && right.length() > 1e-6 && extent.is_finite() && extent > 0.0
     };
+    let kept: Vec<bool> = scene.cameras.iter().map(|camera| usable(&camera)).collect();
     let mut cameras: Vec<Camera> = scene.cameras.iter().filter(usable).cloned().collect();
+    // The rig follows those that are left.
+    flat.rig.cameras.retain(|attached| kept.get(attached.target as usize).copied().unwrap_or(false));
+    for attached in &mut flat.rig.cameras {
+        attached.target = kept.iter().take(attached.target as usize).filter(|kept| **kept).count() as u32;
+    }
     let unusable = scene.cameras.len() - cameras.len();
     if unusable > 0 {
         warnings.push(format!("{unusable} cameras that cannot project were left out"));

@@ -1,5 +1,6 @@
 //! Meshes as triangles: what traversal reads and what shading reads, in the space of a bottom level.
 
+use super::deformers::usable;
 use crate::error::{Error, Result};
 use crate::scene::gpu_types::{
     BITANGENT_SHIFT, NONE, SHAPE_SHIFT, TRIANGLE_ALPHA_MASK, TRIANGLE_DOUBLE_SIDED, TRIANGLE_TANGENTS, Triangle,
@@ -18,16 +19,15 @@ pub(super) struct Soup {
     pub attributes: Vec<TriangleAttributes>,
     /// Triangles left out because they have no area or are not finite.
     pub dropped: u64,
+    /// Of a mesh that changes its shape: the three vertices of each triangle.
+    pub corners: Vec<[u32; 3]>,
 }
 
 impl Soup {
     /// Adds a mesh through `transform`. The mesh must have been checked by [`check_all`].
     pub fn add(&mut self, scene: &Scene, mesh: &Mesh, transform: Mat4) {
-        let flags = scene.materials.get(mesh.material as usize).map_or(0, |material| {
-            let masked = matches!(material.alpha, AlphaMode::Mask(_));
-            u32::from(material.is_two_sided()) * TRIANGLE_DOUBLE_SIDED + u32::from(masked) * TRIANGLE_ALPHA_MASK
-        }) | (mesh.shape as u32) << SHAPE_SHIFT;
-        let placed = Placed::new(mesh, transform, flags);
+        let flags = flags(scene, mesh);
+        let placed = Placed::new(mesh, transform, flags, false);
         for corners in mesh.indices.as_chunks::<3>().0 {
             match placed.triangle(corners.map(|c| c as usize)) {
                 Some((triangle, attributes)) => {
@@ -38,6 +38,25 @@ impl Soup {
             }
         }
     }
+}
+
+impl Soup {
+    /// A mesh that changes its shape, as it is. Triangles without area are kept, for they may gain some.
+    pub fn of_deforming(scene: &Scene, mesh: &Mesh) -> Soup {
+        let placed = Placed::new(mesh, Mat4::IDENTITY, flags(scene, mesh), true);
+        let corners = mesh.indices.as_chunks::<3>().0;
+        let each = corners.iter().filter_map(|corners| placed.triangle(corners.map(|c| c as usize)));
+        let (triangles, attributes) = each.unzip();
+        Soup { triangles, attributes, dropped: 0, corners: corners.to_vec() }
+    }
+}
+
+/// `TRIANGLE_*` bits that a mesh's material asks for, and what its triangles stand for.
+fn flags(scene: &Scene, mesh: &Mesh) -> u32 {
+    scene.materials.get(mesh.material as usize).map_or(0, |material| {
+        let masked = matches!(material.alpha, AlphaMode::Mask(_));
+        u32::from(material.is_two_sided()) * TRIANGLE_DOUBLE_SIDED + u32::from(masked) * TRIANGLE_ALPHA_MASK
+    }) | (mesh.shape as u32) << SHAPE_SHIFT
 }
 
 /// Checks every mesh.
@@ -85,16 +104,18 @@ struct Placed<'a> {
     /// Takes normals along: the cofactors, which exist for singular matrices too, with the determinant's sign.
     normal_matrix: Mat3,
     mirrored: bool,
+    /// Whether triangles without area are kept.
+    keeps_all: bool,
 }
 
 impl<'a> Placed<'a> {
-    fn new(mesh: &'a Mesh, transform: Mat4, flags: u32) -> Self {
+    fn new(mesh: &'a Mesh, transform: Mat4, flags: u32, keeps_all: bool) -> Self {
         let linear = Mat3::from_mat4(transform);
         let (x, y, z) = (linear.x_axis, linear.y_axis, linear.z_axis);
         let mirrored = linear.determinant() < 0.0;
         let sign = if mirrored { -1.0 } else { 1.0 };
         let normal_matrix = Mat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign;
-        Placed { mesh, transform, flags, linear, normal_matrix, mirrored }
+        Placed { mesh, transform, flags, linear, normal_matrix, mirrored, keeps_all }
     }
 
     /// The triangle through the transform, or none if it has no area or is not finite.
@@ -102,8 +123,16 @@ impl<'a> Placed<'a> {
         if self.mirrored {
             corners.swap(1, 2);
         }
-        let [p0, p1, p2] = corners.map(|c| self.transform.transform_point3(self.mesh.positions[c]));
-        let face = face_normal([p0, p1, p2])?;
+        let mut positions = corners.map(|c| self.transform.transform_point3(self.mesh.positions[c]));
+        let face = match face_normal(positions) {
+            Some(face) => face,
+            None if self.keeps_all => Vec3::Y,
+            None => return None,
+        };
+        if self.keeps_all {
+            positions = positions.map(usable);
+        }
+        let [p0, p1, p2] = positions;
         let has_tangents = !self.mesh.tangents.is_empty();
         let normals = corners.map(|c| {
             let normal = self.mesh.normals.get(c).and_then(|n| (self.normal_matrix * *n).try_normalize());

@@ -8,6 +8,7 @@ use crate::scene::gpu_types::{
     LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, Material, MaterialExtensions, NONE, TextureSlot, Triangle,
     TriangleAttributes,
 };
+use crate::scene::rig::Counts;
 use std::ops::Range;
 
 /// (where, what is wrong there).
@@ -27,10 +28,6 @@ pub(super) fn validate(scene: &FlatScene) -> Result<(), Fault> {
     emitters(scene)?;
     let punctual = (scene.lights.len() as u64).checked_sub(u64::from(scene.first_punctual));
     let punctual = punctual.ok_or_else(|| fault("first_punctual", "past the lights"))?;
-    each("motions", &scene.motions, |_, motion| {
-        let finite = motion.center.is_finite() && motion.axis.is_finite() && motion.angular_speed.is_finite();
-        must(u64::from(motion.light) < punctual && finite, "no such light, or numbers that are not finite")
-    })?;
     must(scene.textures.len() <= MAX_ARRAYS, "too many").map_err(|what| fault("textures", what))?;
     each("textures", &scene.textures, |_, array| check_texture_array(array))?;
     if let Some(environment) = &scene.environment {
@@ -40,6 +37,10 @@ pub(super) fn validate(scene: &FlatScene) -> Result<(), Fault> {
         let finite = camera.position.is_finite() && camera.forward.is_finite() && camera.up.is_finite();
         must(finite, "numbers that are not finite")
     })?;
+    let counts = Counts { instances: scene.instances.len(), lights: punctual as usize, cameras: scene.cameras.len() };
+    scene.rig.check(counts)?;
+    let triangles: Vec<u32> = scene.meshes.iter().map(|mesh| mesh.triangles).collect();
+    scene.deformers.check(&triangles, &scene.rig.instances)?;
     let complete = !scene.materials.is_empty() && !scene.cameras.is_empty();
     must(complete, "materials or cameras are missing").map_err(|what| fault("scene", what))?;
     must(scene.bounds.iter().all(|corner| corner.is_finite()), "not finite").map_err(|what| fault("bounds", what))
@@ -203,8 +204,8 @@ fn is_sound(textures: &[TextureArray], slot: &TextureSlot) -> bool {
 }
 
 fn check_light(scene: &FlatScene, index: usize, light: &Light) -> Result<(), &'static str> {
-    let Light { position, previous_position, direction, intensity, .. } = light;
-    let vectors = [position, previous_position, direction, intensity];
+    let Light { position, direction, intensity, .. } = light;
+    let vectors = [position, direction, intensity];
     let scalars = [light.range, light.cos_inner, light.cos_outer, light.pmf, light.alias_threshold];
     let finite = vectors.iter().all(|v| v.is_finite()) && scalars.iter().all(|s| s.is_finite());
     must(finite, "numbers that are not finite")?;

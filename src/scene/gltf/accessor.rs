@@ -34,6 +34,18 @@ pub(super) const COLOR: Shape = Shape { types: &[Type::Vec3, Type::Vec4], compon
 pub(super) const FLOAT_VEC3: Shape = Shape { types: VEC3, components: &[F32], quantized: &[] };
 /// Rotations of instances; integers are normalised.
 pub(super) const QUATERNION: Shape = Shape { types: VEC4, components: &[F32, I8, I16], quantized: &[] };
+/// Joints of a skin that move a vertex.
+pub(super) const JOINTS: Shape = Shape { types: &[Type::Vec4], components: &[U8, U16], quantized: &[] };
+/// How much each of them does; integers are normalised.
+pub(super) const WEIGHTS: Shape = Shape { types: &[Type::Vec4], components: &[F32, U8, U16], quantized: &[] };
+/// Inverse bind matrices.
+pub(super) const MATRIX: Shape = Shape { types: &[Type::Mat4], components: &[F32], quantized: &[] };
+/// Times of keyframes.
+pub(super) const TIME: Shape = Shape { types: &[Type::Scalar], components: &[F32], quantized: &[] };
+/// Keyframes of rotations; integers are normalised.
+pub(super) const ROTATION: Shape = Shape { types: &[Type::Vec4], components: &[F32, I8, U8, I16, U16], quantized: &[] };
+/// Keyframes of the weights of morph targets; integers are normalised.
+pub(super) const SCALAR: Shape = Shape { types: &[Type::Scalar], components: &[F32, I8, U8, I16, U16], quantized: &[] };
 /// Vertex indices.
 pub(super) const INDEX: Shape = Shape { types: &[Type::Scalar], components: &[U8, U16, U32], quantized: &[] };
 
@@ -128,6 +140,16 @@ impl<'a> Elements<'a> {
             (U16, [a, b, ..]) => scaled(f32::from(u16::from_le_bytes([*a, *b])), 65_535.0),
             (F32, [a, b, c, d, ..]) => f32::from_le_bytes([*a, *b, *c, *d]),
             _ => fill,
+        })
+    }
+
+    /// Element `i` as four small integers.
+    pub fn joints(&self, i: usize) -> [u16; 4] {
+        let bytes = self.bytes(i).unwrap_or_default();
+        std::array::from_fn(|c| match (self.component, bytes.get(c * self.component.size()..).unwrap_or_default()) {
+            (U8, [a, ..]) => u16::from(*a),
+            (U16, [a, b, ..]) => u16::from_le_bytes([*a, *b]),
+            _ => 0,
         })
     }
 

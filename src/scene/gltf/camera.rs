@@ -8,8 +8,8 @@ use glam::{Mat4, Vec3};
 use gltf::json;
 use std::f32::consts::PI;
 
-/// Camera `index` of the file where a node of transform `to_world` puts it: it looks along the node's -Z with +Y up,
-/// made orthonormal. None where the node's transform leaves no such pair. Named after itself, else after its node.
+/// Camera `index` of the file where a node of transform `to_world` puts it, as [`Camera::at`]. Named after itself, else
+/// after its node.
 pub(super) fn load(
     document: &Document,
     index: usize,
@@ -21,13 +21,8 @@ pub(super) fn load(
     let place = format!("cameras[{index}]");
     let projection = projection(document, camera, &place)?;
     let name = camera.name.as_deref().or(node.name.as_deref()).map_or(place, tidy);
-    let forward = to_world.transform_vector3(Vec3::NEG_Z).try_normalize();
-    let up = forward.and_then(|forward| {
-        let up = to_world.transform_vector3(Vec3::Y).try_normalize()?;
-        up.reject_from_normalized(forward).try_normalize()
-    });
-    let position = to_world.w_axis.truncate();
-    Ok(forward.zip(up).map(|(forward, up)| Camera { name, position, forward, up, projection }))
+    let camera = Camera { name, position: Vec3::ZERO, forward: Vec3::NEG_Z, up: Vec3::Y, projection };
+    Ok(camera.at(to_world))
 }
 
 /// Field of view or half height; aspect ratio and clipping planes are the renderer's own.

@@ -27,6 +27,8 @@ pub(super) struct Document<'a> {
     pub variant: Option<usize>,
     /// What decodes compressed data; none where the file does not say that it has any.
     pub decoders: Option<&'a dyn Decoders>,
+    /// Channels of animations that target no node (KHR_animation_pointer), and were left out.
+    pub pointer_channels: usize,
 }
 
 impl Document<'_> {
@@ -72,8 +74,11 @@ impl Document<'_> {
     }
 }
 
+/// The JSON, the binary chunk of a .glb, and the header.
+type Opened<'a> = (&'a [u8], Option<&'a [u8]>, Header);
+
 /// The JSON, the BIN chunk if there is one, and the checked header.
-fn open<'a>(file: &str, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>, Header)> {
+fn open<'a>(file: &str, bytes: &'a [u8]) -> Result<Opened<'a>> {
     let (json, binary) = if bytes.starts_with(b"glTF") { split_glb(file, bytes)? } else { (bytes, None) };
     check_json_size(file, json)?;
     let header = check_header(file, json)?;
@@ -98,24 +103,33 @@ pub(super) fn parse<'a>(file: &'a str, bytes: &'a [u8], options: &Options<'a>) -
         contents.variants.iter().position(|known| known == name).ok_or_else(unknown)
     });
     let variant = variant.transpose()?;
-    let root = if header.scenes.iter().all(|scene| scene.nodes.is_some()) {
+    let pointer_channels =
+        header.animations.iter().flat_map(|animation| &animation.channels).filter(|c| c.is_pointer()).count();
+    let root = if pointer_channels == 0 && header.scenes.iter().all(|scene| scene.nodes.is_some()) {
         serde_json::from_slice(json).map_err(|error| json_error(file, &error))?
     } else {
         // By way of text: a second deserializer, of values, would add a tenth to what the page downloads.
-        let completed = serde_json::from_slice(json).and_then(|json| serde_json::to_vec(&with_scene_nodes(json)));
+        let completed = serde_json::from_slice(json).and_then(|json| serde_json::to_vec(&completed(json)));
         let completed = completed.map_err(|error| json_error(file, &error))?;
         // Lines and columns of that text are not the file's.
         serde_json::from_slice(&completed).map_err(|error| Error::bad_file(file, "JSON", json_fault(&error)))?
     };
     let decoders = options.decoders.filter(|_| contents.needs_decoders);
-    Ok(Document { file, root, binary, contents, scene: options.scene, variant, decoders })
+    Ok(Document { file, root, binary, contents, scene: options.scene, variant, decoders, pointer_channels })
 }
 
-/// Gives each scene its `nodes`, which the specification lets it leave out, but the JSON crate does not.
-fn with_scene_nodes(mut json: Value) -> Value {
+/// Gives each scene its `nodes`, which the specification lets it leave out, but the JSON crate does not; and takes away
+/// the channels of animations that target no node, which extensions let leave it out.
+fn completed(mut json: Value) -> Value {
     let scenes = json.get_mut("scenes").and_then(Value::as_array_mut);
     for scene in scenes.into_iter().flatten().filter_map(Value::as_object_mut) {
         scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
+    }
+    let animations = json.get_mut("animations").and_then(Value::as_array_mut);
+    for animation in animations.into_iter().flatten() {
+        if let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) {
+            channels.retain(|channel| channel.get("target").is_some_and(|target| target.get("node").is_some()));
+        }
     }
     json
 }
@@ -202,6 +216,33 @@ struct Header {
     scenes: Vec<SceneHeader>,
     #[serde(default)]
     extensions: Extensions,
+    animations: Vec<AnimationHeader>,
+}
+
+/// One of `animations` of [`Header`].
+#[derive(serde::Deserialize)]
+struct AnimationHeader {
+    #[serde(default)]
+    channels: Vec<ChannelHeader>,
+}
+
+/// One of `channels` of [`AnimationHeader`].
+#[derive(serde::Deserialize)]
+struct ChannelHeader {
+    target: TargetHeader,
+}
+
+/// `target` of [`ChannelHeader`].
+#[derive(serde::Deserialize)]
+struct TargetHeader {
+    node: Option<serde::de::IgnoredAny>,
+}
+
+impl ChannelHeader {
+    /// Whether it targets no node.
+    fn is_pointer(&self) -> bool {
+        self.target.node.is_none()
+    }
 }
 
 /// One of `scenes` of [`Header`].

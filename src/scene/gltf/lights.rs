@@ -7,8 +7,7 @@ use glam::{Mat4, Vec3};
 use gltf::json::extensions::scene::khr_lights_punctual::{Light, Type};
 use std::f32::consts::FRAC_PI_2;
 
-/// Light `index` of the file where a node of transform `to_world` puts it: it shines along the node's -Z. None where the
-/// node's scale leaves no direction. The node's scale changes neither intensity nor range.
+/// Light `index` of the file where a node of transform `to_world` puts it, as [`PunctualLight::at`].
 pub(super) fn load(
     document: &Document,
     index: usize,
@@ -33,10 +32,8 @@ pub(super) fn load(
         Type::Directional => PunctualKind::Directional,
         Type::Spot => spot(document, light, &format!("{place}.spot"))?,
     };
-    let direction = to_world.transform_vector3(Vec3::NEG_Z).try_normalize();
-    let direction = if kind == PunctualKind::Point { Some(direction.unwrap_or(Vec3::NEG_Z)) } else { direction };
-    let position = to_world.w_axis.truncate();
-    Ok(direction.map(|direction| PunctualLight { kind, position, direction, intensity, range }))
+    let light = PunctualLight { kind, position: Vec3::ZERO, direction: Vec3::NEG_Z, intensity, range };
+    Ok(light.at(to_world))
 }
 
 /// The cone of a spot light. Equal angles, a hard edge, are let pass: common exporters write them.

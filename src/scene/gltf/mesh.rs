@@ -5,7 +5,7 @@ use super::buffers::Buffers;
 use super::container::Document;
 use super::draco::Draco;
 use super::material::UvSets;
-use super::{MAX_GEOMETRY_BYTES, topology, variants};
+use super::{MAX_GEOMETRY_BYTES, deformation, topology, variants};
 use crate::error::Result;
 use crate::scene::{Material, Mesh, Scene, TextureRef, tangents};
 use glam::{Vec2, Vec3, Vec4};
@@ -156,6 +156,15 @@ impl Reader<'_> {
             Some(normals) => given_normals(&mesh, normals, &sources, &mut repaired),
             None => flat_normals(&mesh),
         };
+        let deformation = deformation::Reader {
+            document: self.document,
+            buffers: self.buffers,
+            source: self.source,
+            place: self.place,
+            count: positions.count,
+        };
+        mesh.deformation = deformation.read(budget, &sources, warnings)?;
+        mesh.deformation.flat = normals.is_none();
         if repaired > 0 {
             warnings.push(format!("{}: {repaired} attribute(s) were not usable numbers and were replaced", self.place));
         }

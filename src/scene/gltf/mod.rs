@@ -2,17 +2,19 @@
 //!
 //! Source: the glTF 2.0 specification and the extensions named in [`SUPPORTED_EXTENSIONS`]. The nodes of one scene are
 //! loaded (the default one unless another is chosen; every root node where there are no scenes). Occlusion textures
-//! are ignored, for light transport is computed; animations, skins and morph targets are not played (a warning says so).
+//! are ignored, for light transport is computed. Animations, skins and morph targets become the scene's rig.
 //!
 //! Nothing in a file is trusted: every size, count, offset and index is checked before it is used or allocated for, so
 //! the crate's typed JSON (`gltf::json`) is read directly rather than through its iterators, which panic.
 
 mod accessor;
+mod animations;
 mod area_lights;
 mod buffers;
 mod camera;
 mod container;
 mod decoders;
+mod deformation;
 mod draco;
 mod images;
 mod instancing;
@@ -21,6 +23,7 @@ mod material;
 mod material_extensions;
 mod mesh;
 mod nodes;
+mod skins;
 mod topology;
 mod uri;
 mod variants;
@@ -160,7 +163,7 @@ pub fn load_bytes_with(name: &str, bytes: &[u8], options: &Options, resolve: Res
     let document = container::parse(name, bytes, options)?;
     let buffers = buffers::Buffers::load(&document, resolve)?;
     let mut scene = Scene { name: scene_name(name), ..Scene::default() };
-    warn_of_unplayed(&document, &mut scene.warnings);
+    warn_of_extensions(&document, &mut scene.warnings);
     let uv_sets = material::load(&document, &buffers, resolve, &mut scene)?;
     nodes::load(&document, &buffers, &uv_sets, &mut scene)?;
     if scene.meshes.is_empty() {
@@ -181,19 +184,10 @@ fn scene_name(file: &str) -> String {
 }
 
 /// Says which parts of the file stand still.
-fn warn_of_unplayed(document: &Document, warnings: &mut Vec<String>) {
+fn warn_of_extensions(document: &Document, warnings: &mut Vec<String>) {
     let root = &document.root;
     for extension in root.extensions_used.iter().filter(|e| !SUPPORTED_EXTENSIONS.contains(&e.as_str())) {
         warnings.push(format!("optional extension {} is ignored", tidy(extension)));
-    }
-    if !root.animations.is_empty() {
-        warnings.push(format!("{} animation(s) are not played", root.animations.len()));
-    }
-    if !root.skins.is_empty() {
-        warnings.push(format!("{} skin(s) are not applied: skinned meshes stand in their bind pose", root.skins.len()));
-    }
-    if root.meshes.iter().flat_map(|mesh| &mesh.primitives).any(|primitive| primitive.targets.is_some()) {
-        warnings.push("morph targets are not applied".into());
     }
 }
 

@@ -1,4 +1,4 @@
-//! Shaders to plant faults in, which a running program reloads.
+//! Faults planted in shaders that a running program reloads.
 
 use std::path::{Path, PathBuf};
 
@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 pub struct ShaderCopy(pub PathBuf);
 
 impl ShaderCopy {
+    /// A fresh copy.
     pub fn new() -> Self {
         use std::sync::atomic::{AtomicU32, Ordering};
         static COUNT: AtomicU32 = AtomicU32::new(0);
@@ -17,7 +18,7 @@ impl ShaderCopy {
         ShaderCopy(copy)
     }
 
-    /// Replaces text that stands once in a file.
+    /// Puts `new` in the place of `old`, which must stand in `file` once.
     pub fn edit(&self, file: &str, old: &str, new: &str) {
         let path = self.0.join(file);
         let text = std::fs::read_to_string(&path).expect("the shader is there");

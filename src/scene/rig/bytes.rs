@@ -1,0 +1,91 @@
+//! A rig as arrays of bytes, for the flat scene's file.
+
+use super::{Clip, Rig};
+use crate::error::Result;
+use bytemuck::Pod;
+use serde::{Deserialize, Serialize};
+
+/// What is not a large array, and how long those are.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub(in crate::scene) struct Header {
+    clips: Vec<Clip>,
+    lengths: [usize; 10],
+}
+
+/// Takes the next array of this many elements.
+pub(in crate::scene) trait TakeArray {
+    fn take_array<T: Pod>(&mut self, count: usize, place: &str) -> Result<Vec<T>>;
+}
+
+impl Rig {
+    /// What [`Rig::from_arrays`] needs besides the arrays.
+    pub(in crate::scene) fn header(&self) -> Header {
+        Header {
+            clips: self.clips.clone(),
+            lengths: [
+                self.nodes.len(),
+                self.channels.len(),
+                self.keys.len(),
+                self.spins.len(),
+                self.skins.len(),
+                self.joints.len(),
+                self.weights.len(),
+                self.instances.len(),
+                self.lights.len(),
+                self.cameras.len(),
+            ],
+        }
+    }
+
+    /// The arrays, in the order of the header's lengths.
+    pub(in crate::scene) fn arrays(&self) -> [&[u8]; 10] {
+        use bytemuck::cast_slice;
+        [
+            cast_slice(&self.nodes),
+            cast_slice(&self.channels),
+            cast_slice(&self.keys),
+            cast_slice(&self.spins),
+            cast_slice(&self.skins),
+            cast_slice(&self.joints),
+            cast_slice(&self.weights),
+            cast_slice(&self.instances),
+            cast_slice(&self.lights),
+            cast_slice(&self.cameras),
+        ]
+    }
+
+    /// The same, to be filled.
+    pub(in crate::scene) fn arrays_mut(&mut self) -> [&mut [u8]; 10] {
+        use bytemuck::cast_slice_mut;
+        [
+            cast_slice_mut(&mut self.nodes),
+            cast_slice_mut(&mut self.channels),
+            cast_slice_mut(&mut self.keys),
+            cast_slice_mut(&mut self.spins),
+            cast_slice_mut(&mut self.skins),
+            cast_slice_mut(&mut self.joints),
+            cast_slice_mut(&mut self.weights),
+            cast_slice_mut(&mut self.instances),
+            cast_slice_mut(&mut self.lights),
+            cast_slice_mut(&mut self.cameras),
+        ]
+    }
+
+    /// The rig again; not checked yet.
+    pub(in crate::scene) fn from_arrays(header: Header, reader: &mut impl TakeArray) -> Result<Rig> {
+        let [nodes, channels, keys, spins, skins, joints, weights, instances, lights, cameras] = header.lengths;
+        Ok(Rig {
+            clips: header.clips,
+            nodes: reader.take_array(nodes, "rig.nodes")?,
+            channels: reader.take_array(channels, "rig.channels")?,
+            keys: reader.take_array(keys, "rig.keys")?,
+            spins: reader.take_array(spins, "rig.spins")?,
+            skins: reader.take_array(skins, "rig.skins")?,
+            joints: reader.take_array(joints, "rig.joints")?,
+            weights: reader.take_array(weights, "rig.weights")?,
+            instances: reader.take_array(instances, "rig.instances")?,
+            lights: reader.take_array(lights, "rig.lights")?,
+            cameras: reader.take_array(cameras, "rig.cameras")?,
+        })
+    }
+}

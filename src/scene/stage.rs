@@ -1,0 +1,226 @@
+//! A flat scene in motion: what of it changes, as it is now and as it was in the frame before.
+//!
+//! The frame before is a whole scene of its own, with transforms, shapes, lights and both levels of its BVH, so that
+//! temporal reuse can rebuild and trace it exactly.
+
+use super::flat::FlatScene;
+use super::flat::deformers::{Deformer, write_shape};
+use super::gpu_types::{BvhNode, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, NONE, Triangle, TriangleAttributes};
+use super::rig::Pose;
+use super::rig::deform::Deformed;
+use super::{Camera, bvh};
+use glam::{Mat4, Vec3};
+use std::ops::Range;
+
+/// A bottom level is built again once rays through it are expected to cost this many times what they did when it was
+/// built (by the surface-area heuristic), for refitting keeps its tree and only moves the boxes.
+pub const REBUILD_RATIO: f32 = 1.6;
+
+/// The parts of a scene that change from frame to frame.
+#[derive(Debug, Clone)]
+pub struct Stage {
+    clip: usize,
+    time: f64,
+    pose: Pose,
+    /// Object to world of each instance of the flat scene.
+    pub transforms: Vec<Mat4>,
+    /// The same in the frame before.
+    pub previous_transforms: Vec<Mat4>,
+    /// The punctual lights of the flat scene.
+    pub lights: Vec<Light>,
+    /// The same in the frame before.
+    pub previous_lights: Vec<Light>,
+    /// Meshes that change their shape, in the order of the scene's deformers.
+    pub bodies: Vec<Body>,
+    /// Whether anything is not where it was in the frame before.
+    moved: bool,
+    version: u64,
+}
+
+/// A mesh that changes its shape.
+#[derive(Debug, Clone)]
+pub struct Body {
+    /// Index in the scene's meshes.
+    pub mesh: u32,
+    /// Its triangles now, in the order of its leaves.
+    pub triangles: Vec<Triangle>,
+    /// Their attributes.
+    pub attributes: Vec<TriangleAttributes>,
+    /// Its bottom level; children and triangles count from its own first.
+    pub nodes: Vec<BvhNode>,
+    /// Whether the order of its triangles is another than in the frame before.
+    pub rebuilt: bool,
+    corners: Vec<[u32; 3]>,
+    /// Expected cost of a ray when the bottom level was built.
+    built_cost: f32,
+    emits: bool,
+    capacity: usize,
+}
+
+impl Stage {
+    /// Everything of `scene` as it is at `time` of animation `clip`; the frame before is the same.
+    pub fn new(scene: &FlatScene, clip: usize, time: f64) -> Self {
+        let lights = scene.lights.get(Stage::punctual(scene)).unwrap_or_default().to_vec();
+        let transforms: Vec<Mat4> = scene.instances.iter().map(|instance| instance.transform).collect();
+        let bodies = scene.deformers.list.iter().map(|deformer| Body::new(scene, deformer)).collect();
+        let mut stage = Stage {
+            clip,
+            time,
+            pose: Pose::default(),
+            previous_transforms: transforms.clone(),
+            transforms,
+            previous_lights: lights.clone(),
+            lights,
+            bodies,
+            moved: false,
+            version: 0,
+        };
+        stage.take(scene, clip, time);
+        stage.rest();
+        stage
+    }
+
+    /// Goes to `time` of animation `clip` as if nothing had been before.
+    pub fn start(&mut self, scene: &FlatScene, clip: usize, time: f64) {
+        if !scene.rig.is_still() && (clip, time) != (self.clip, self.time) {
+            self.take(scene, clip, time);
+        }
+        self.rest();
+    }
+
+    /// Goes on to `time` of animation `clip`; where everything was becomes the frame before.
+    pub fn step(&mut self, scene: &FlatScene, clip: usize, time: f64) {
+        self.rest();
+        if scene.rig.is_still() || (clip, time) == (self.clip, self.time) {
+            return;
+        }
+        self.take(scene, clip, time);
+        self.moved = true;
+    }
+
+    /// The punctual lights among those of a scene.
+    pub fn punctual(scene: &FlatScene) -> Range<usize> {
+        let first = (scene.first_punctual as usize).min(scene.lights.len());
+        let is_punctual = |light: &&Light| (LIGHT_POINT..=LIGHT_DIRECTIONAL).contains(&light.kind);
+        first..first + scene.lights[first..].iter().take_while(is_punctual).count()
+    }
+
+    /// Another number whenever anything has been moved.
+    pub fn version(&self) -> u64 {
+        self.version
+    }
+
+    /// Whether anything is not where it was in the frame before.
+    pub fn has_moved(&self) -> bool {
+        self.moved
+    }
+
+    /// Whether triangles of the frame before can no longer be told by their numbers.
+    pub fn is_renumbered(&self) -> bool {
+        self.bodies.iter().any(|body| body.rebuilt)
+    }
+
+    /// Makes the frame before the same as this one.
+    fn rest(&mut self) {
+        self.previous_transforms.clone_from(&self.transforms);
+        self.previous_lights.clone_from(&self.lights);
+        self.bodies.iter_mut().for_each(|body| body.rebuilt = false);
+        self.moved = false;
+    }
+
+    fn take(&mut self, scene: &FlatScene, clip: usize, time: f64) {
+        (self.clip, self.time) = (clip, time);
+        self.version += 1;
+        self.pose = scene.rig.pose(clip, time);
+        for placement in &scene.rig.instances {
+            if let Some(transform) = self.transforms.get_mut(placement.instance as usize) {
+                *transform = self.pose.instance(placement);
+            }
+        }
+        for attached in &scene.rig.lights {
+            if let Some(light) = self.lights.get_mut(attached.target as usize) {
+                let node = self.pose.node(attached.node);
+                light.position = node.w_axis.truncate();
+                light.direction = node.transform_vector3(Vec3::NEG_Z).try_normalize().unwrap_or(light.direction);
+            }
+        }
+        let mut vertices = Vec::new();
+        for (body, deformer) in self.bodies.iter_mut().zip(&scene.deformers.list) {
+            scene.deformers.deform(scene, deformer, &self.pose, &mut vertices);
+            body.shape(deformer, &vertices);
+        }
+    }
+
+    /// Camera `index` of the scene where it is now.
+    pub fn camera(&self, scene: &FlatScene, index: usize) -> Option<Camera> {
+        let camera = scene.cameras.get(index)?;
+        let attached = scene.rig.cameras.iter().find(|attached| attached.target as usize == index);
+        attached.map_or_else(|| Some(camera.clone()), |attached| camera.at(&self.pose.node(attached.node)))
+    }
+}
+
+impl Body {
+    fn new(scene: &FlatScene, deformer: &Deformer) -> Self {
+        let mesh = &scene.meshes[deformer.mesh as usize];
+        let triangles = mesh.first_triangle as usize..(mesh.first_triangle + mesh.triangles) as usize;
+        let nodes = mesh.root as usize..(mesh.root + mesh.nodes) as usize;
+        let local = |node: &BvhNode| {
+            let base = if node.count == 0 { mesh.root } else { mesh.first_triangle };
+            BvhNode { first: node.first - base, ..*node }
+        };
+        let nodes: Vec<BvhNode> = scene.nodes[nodes].iter().map(local).collect();
+        Body {
+            mesh: deformer.mesh,
+            triangles: scene.triangles[triangles.clone()].to_vec(),
+            attributes: scene.attributes[triangles.clone()].to_vec(),
+            corners: scene.deformers.corners_of(deformer, mesh.triangles).to_vec(),
+            built_cost: bvh::cost(&nodes),
+            capacity: Body::node_capacity(nodes.len()),
+            nodes,
+            rebuilt: false,
+            emits: scene.triangles[triangles].iter().any(|triangle| triangle.light != NONE),
+        }
+    }
+
+    /// Most nodes that a bottom level may have when it is built again, if it had `nodes` at first.
+    pub fn node_capacity(nodes: usize) -> usize {
+        nodes + nodes / 4 + 2
+    }
+
+    /// Whether any of its triangles is a light.
+    pub fn emits(&self) -> bool {
+        self.emits
+    }
+
+    /// The box of everything.
+    pub fn bounds(&self) -> [Vec3; 2] {
+        self.nodes.first().map_or([Vec3::ZERO; 2], |root| [root.min, root.max])
+    }
+
+    /// Takes a shape, and refits the bottom level or builds it again.
+    fn shape(&mut self, deformer: &Deformer, vertices: &[Deformed]) {
+        write_shape(vertices, &self.corners, deformer.flat == 1, &mut self.triangles, &mut self.attributes);
+        bvh::refit(&mut self.nodes, &self.triangles);
+        // Lights name their triangles by number: those of a mesh that shines keep their order.
+        let degraded = bvh::cost(&self.nodes) > REBUILD_RATIO * self.built_cost;
+        if self.emits || !degraded {
+            return;
+        }
+        let rebuilt = bvh::build(&self.triangles);
+        if rebuilt.nodes.len() > self.capacity {
+            // There is no room for it: what was refitted is as good as it gets for a while.
+            self.built_cost = bvh::cost(&self.nodes);
+            return;
+        }
+        self.built_cost = bvh::cost(&rebuilt.nodes);
+        self.nodes = rebuilt.nodes;
+        self.triangles = permuted(&self.triangles, &rebuilt.order);
+        self.attributes = permuted(&self.attributes, &rebuilt.order);
+        self.corners = permuted(&self.corners, &rebuilt.order);
+        self.rebuilt = true;
+    }
+}
+
+fn permuted<T: Copy>(list: &[T], order: &[u32]) -> Vec<T> {
+    order.iter().filter_map(|&i| list.get(i as usize)).copied().collect()
+}
