@@ -278,8 +278,10 @@ fn mutated_files_do_no_harm() {
                     }
                 }
                 // A scene may have lights or vertices too far away; whatever the answer, it is no panic.
-                if let Ok(flat) = FlatScene::build(&scene, &mut |_, _| ()) {
-                    assert!(FlatScene::from_bytes(&flat.to_bytes()).is_ok());
+                if let Ok(flat) = FlatScene::build(&scene, &mut |_, _| ())
+                    && let Err(error) = FlatScene::from_bytes(&flat.to_bytes())
+                {
+                    panic!("what was flattened is refused: {error}");
                 }
             }
             Err(error) => assert!(!error.to_string().contains('\n')),

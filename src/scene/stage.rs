@@ -147,6 +147,10 @@ impl Stage {
         for attached in &scene.rig.lights {
             if let Some(light) = self.lights.get_mut(attached.target as usize) {
                 let node = self.pose.node(attached.node);
+                // A light that leads out of all numbers stays where it was.
+                if !node.is_finite() {
+                    continue;
+                }
                 light.position = node.w_axis.truncate();
                 light.direction = node.transform_vector3(Vec3::NEG_Z).try_normalize().unwrap_or(light.direction);
             }
@@ -162,7 +166,10 @@ impl Stage {
     pub fn camera(&self, scene: &FlatScene, index: usize) -> Option<Camera> {
         let camera = scene.cameras.get(index)?;
         let attached = scene.rig.cameras.iter().find(|attached| attached.target as usize == index);
-        attached.map_or_else(|| Some(camera.clone()), |attached| camera.at(&self.pose.node(attached.node)))
+        attached.map_or_else(
+            || Some(camera.clone()),
+            |attached| camera.at(&self.pose.node(attached.node)).filter(|camera| camera.position.is_finite()),
+        )
     }
 }
 

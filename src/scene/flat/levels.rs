@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::scene::bvh::{self, Bvh};
 use crate::scene::gpu_types::{BvhNode, NONE, Triangle, TriangleAttributes};
 use crate::scene::rig::{self, Motion, Pose};
-use crate::scene::{MAX_TRIANGLES, Rig, Scene};
+use crate::scene::{MAX_COORDINATE, MAX_TRIANGLES, Rig, Scene};
 use glam::{Mat3, Mat4, Vec3, Vec4};
 
 /// How often progress is told at most.
@@ -255,15 +255,22 @@ fn instance(mesh: u32, transform: Mat4, source: u32) -> FlatInstance {
     FlatInstance { transform, mesh, first_light: 0, source, padding: 0 }
 }
 
-/// The box round a transformed box; a point out of everything's way for a transform that cannot be undone.
+/// The box round a transformed box; a point out of everything's way for a transform that cannot be undone, or that leads out
+/// of the world.
 pub(crate) fn transformed_box(transform: Mat4, [min, max]: [Vec3; 2]) -> [Vec3; 2] {
+    let nowhere = [Vec3::splat(MAX_COORDINATE); 2];
     if !is_invertible(transform) {
-        return [Vec3::splat(crate::scene::MAX_COORDINATE); 2];
+        return nowhere;
     }
     let center = transform.transform_point3(0.5 * (min + max));
     let linear = Mat3::from_mat4(transform);
     let half = 0.5 * (max - min);
     let extent = linear.x_axis.abs() * half.x + linear.y_axis.abs() * half.y + linear.z_axis.abs() * half.z;
+    // False for what is not a number, too.
+    let is_within = (center.abs() + extent).max_element() <= MAX_COORDINATE;
+    if !is_within {
+        return nowhere;
+    }
     // Rounding must not cut anything off.
     let margin = 1e-6 * (extent + center.abs());
     [center - extent - margin, center + extent + margin]
