@@ -216,6 +216,7 @@ struct Header {
     scenes: Vec<SceneHeader>,
     #[serde(default)]
     extensions: Extensions,
+    #[serde(default)]
     animations: Vec<AnimationHeader>,
 }
 
