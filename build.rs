@@ -23,8 +23,8 @@ fn main() {
     let mut passes = Vec::new();
     collect(&root, &root, &mut passes);
     passes.sort();
-    // The page carries no test kernels.
-    passes.retain(|file| !(wasm && file.starts_with("tests/")));
+    // The page carries no kernels of tests and benchmarks.
+    passes.retain(|file| !(wasm && (file.starts_with("tests/") || file.starts_with("bench/"))));
 
     // A flat copy for other validators (Tint), beside the build rather than in it. Native only.
     let copies = (!wasm).then(|| out.ancestors().nth(4).expect("target/PROFILE/build/NAME/out").join("shaders"));

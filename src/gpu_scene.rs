@@ -1,5 +1,6 @@
 //! The uploaded scene: the buffers and textures of bind group 0, all but the frame uniform.
 
+mod forest;
 mod motion;
 
 use crate::environment_pyramid::EnvironmentPyramid;
@@ -16,6 +17,7 @@ use crate::scene::gpu_types::{
 };
 use crate::scene::stage::Stage;
 use crate::scene::{FlatScene, Shape};
+use forest::Forest;
 use glam::{UVec2, Vec3};
 use motion::Motion;
 
@@ -87,11 +89,12 @@ impl GpuScene {
             Some(e) => ([e.width, e.height], &e.radiance, &e.alias),
             None => (black.0, &black.1, &black.2),
         };
-        let (motion, arrays) = Motion::lay_out(scene);
+        let mut forest = Forest::new(scene, pace).await?;
+        let (motion, arrays) = Motion::lay_out(scene, &mut forest);
         let (first_triangles, rest) = arrays.triangles.split_at(arrays.triangles.len().min(FIRST_TRIANGLES));
         let point = [bytemuck::Zeroable::zeroed()];
         Ok(GpuScene {
-            nodes: gpu.storage_in_slices("nodes", &arrays.nodes, pace).await?,
+            nodes: gpu.storage_in_slices("the nodes of the BVH", &forest.nodes, pace).await?,
             triangles: [
                 gpu.storage_in_slices("triangles", first_triangles, pace).await?,
                 gpu.storage_in_slices(
@@ -106,7 +109,7 @@ impl GpuScene {
             material_extensions: DataTexture::new(gpu, "material extensions", &scene.material_extensions)?,
             instances: DataTexture::new(gpu, "instances", &arrays.instances)?,
             instance_count: scene.instances.len() as u32,
-            top_level: scene.root(),
+            top_level: forest.top_level,
             lights: if arrays.lights.is_empty() {
                 gpu.storage("lights", std::mem::size_of::<Light>() as u64)?
             } else {

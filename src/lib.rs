@@ -32,7 +32,7 @@ pub use scene::{FlatScene, Scene};
 pub fn gpu_layouts() -> Vec<scene::gpu_types::Layout> {
     use scene::gpu_types as types;
     let shared = [
-        types::BvhNode::LAYOUT,
+        types::WideNode::LAYOUT,
         types::Triangle::LAYOUT,
         types::TriangleAttributes::LAYOUT,
         types::Instance::LAYOUT,

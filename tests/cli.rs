@@ -454,6 +454,40 @@ fn bench_measures_passes_and_rays() {
 }
 
 #[test]
+fn bench_rays_measures_four_sets() {
+    let args = ["bench", "rays", "builtin:cornell", "--size", "32x32", "--runs", "1"];
+    let report = succeed_json(&[&args[..], &["--json"]].concat());
+    let sets = report["sets"].as_array().unwrap();
+    let names: Vec<_> = sets.iter().map(|set| set["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["primary", "diffuse", "shadow", "second bounce"]);
+    assert_eq!((sets[0]["rays"].as_u64(), sets[1]["rays"].as_u64()), (Some(32 * 32), sets[0]["hits"].as_u64()));
+    assert!(sets.iter().all(|set| set["plain"].as_f64() > Some(0.0) && set["queue"].as_f64() > Some(0.0)), "{report}");
+    assert_eq!(report["builds"].as_array().unwrap().len(), 2);
+    assert!(succeed(&args).contains("Mrays/s"));
+}
+
+/// Straight up from the floor of the box to its ceiling, a metre above; up from there; and to half a metre.
+#[test]
+fn bench_rays_traces_a_file() {
+    let folder = Folder::new("rays");
+    let ray = |y: f32, t_max: f32| [-0.3, y, 0.2, 0.0, 0.0, 1.0, 0.0, t_max];
+    let rays: Vec<u8> =
+        [ray(0.7, 100.0), ray(2.0, 100.0), ray(0.7, 0.1)].concat().into_iter().flat_map(f32::to_le_bytes).collect();
+    let (file, hits) = (folder.write("rays.bin", &rays), folder.path("hits.bin"));
+    succeed(&["bench", "rays", "builtin:cornell", "--rays", &file, "--hits", &hits, "--runs", "1"]);
+    let bytes = std::fs::read(&hits).unwrap();
+    let words: Vec<u32> = bytes.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
+    assert_eq!(words.len(), 6);
+    assert!((f32::from_bits(words[0]) - 0.3).abs() < 0.05 && words[1] != u32::MAX, "{words:?}");
+    assert_eq!(words[2..], [100f32.to_bits(), u32::MAX, 0.1f32.to_bits(), u32::MAX]);
+
+    let short = folder.write("short.bin", &rays[..31]);
+    let output = restir(&["bench", "rays", "builtin:cornell", "--rays", &short]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).contains("31 bytes"), "{}", stderr(&output));
+}
+
+#[test]
 fn output_that_nobody_reads_is_no_error() {
     use std::process::Stdio;
     let mut child = Command::new(env!("CARGO_BIN_EXE_restir"))

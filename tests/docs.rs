@@ -193,7 +193,15 @@ fn command_lines(page: &str) -> Vec<String> {
 
 #[test]
 fn command_lines_name_real_subcommands_and_options() {
-    let mut help = BTreeMap::new();
+    let mut known_help: BTreeMap<Vec<String>, Option<String>> = BTreeMap::new();
+    let mut help_of = |path: &[String]| {
+        let ask = || {
+            let output = Command::new(env!("CARGO_BIN_EXE_restir")).args(path).arg("--help").output();
+            let output = output.expect("the restir binary runs");
+            output.status.success().then(|| String::from_utf8_lossy(&output.stdout).into_owned())
+        };
+        known_help.entry(path.to_vec()).or_insert_with(ask).clone()
+    };
     let mut seen = 0;
     for path in pages() {
         for line in command_lines(&read(&path)) {
@@ -201,14 +209,15 @@ fn command_lines_name_real_subcommands_and_options() {
             let place = format!("{}: {line}", path.display());
             // What follows # is a remark, what follows | another program.
             let command = line.split(['#', '|']).next().unwrap_or_default();
-            let mut words = command.split_whitespace().skip(1);
-            let subcommand = words.next().unwrap_or_else(|| panic!("{place}: no subcommand")).to_owned();
-            let help = help.entry(subcommand.clone()).or_insert_with(|| {
-                let output = Command::new(env!("CARGO_BIN_EXE_restir")).args([&subcommand, "--help"]).output();
-                let output = output.expect("the restir binary runs");
-                assert!(output.status.success(), "{place}: there is no subcommand '{subcommand}'");
-                String::from_utf8_lossy(&output.stdout).into_owned()
-            });
+            let mut words = command.split_whitespace().skip(1).peekable();
+            let mut path = vec![words.next().unwrap_or_else(|| panic!("{place}: no subcommand")).to_owned()];
+            let mut help = help_of(&path).unwrap_or_else(|| panic!("{place}: there is no subcommand '{}'", path[0]));
+            // A subcommand of a subcommand stands in the list of the other's help.
+            while let Some(word) = words.next_if(|word| help.lines().any(|l| l.starts_with(&format!("  {word} ")))) {
+                path.push(word.to_owned());
+                help = help_of(&path).unwrap_or_else(|| panic!("{place}: no help"));
+            }
+            let subcommand = path.join(" ");
             for option in words.map(|w| w.trim_matches(['[', ']', '.'])).filter(|w| w.starts_with("--")) {
                 let name = option.split('=').next().unwrap_or_default();
                 let known = help.split([' ', ',', '\n', '=']).any(|word| word == name);

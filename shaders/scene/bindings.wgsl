@@ -40,11 +40,12 @@ struct Frame {
     instance_count: u32, // the twins of instances, as they were in the previous frame, come after as many
 }
 
-struct BvhNode {
-    min: vec3f,
-    first: u32, // inner: left child, the right one follows; leaf: first triangle
-    max: vec3f,
-    count: u32, // 0: inner
+// Four children with boxes of 8 bits a plane; see src/scene/bvh/wide.rs.
+struct WideNode {
+    grid: vec4u,
+    planes_0: vec4u,
+    planes_1: vec4u,
+    children: vec4u,
 }
 
 struct Triangle {
@@ -136,7 +137,7 @@ override scene_has_motion: bool = true;
 override scene_has_many_triangles: bool = true;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<storage, read> nodes: array<BvhNode>;
+@group(0) @binding(1) var<storage, read> nodes: array<WideNode>;
 @group(0) @binding(2) var<storage, read> triangles: array<Triangle>;
 @group(0) @binding(3) var<storage, read> triangles_rest: array<Triangle>;
 @group(0) @binding(4) var<storage, read> lights: array<Light>;

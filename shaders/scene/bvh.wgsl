@@ -5,8 +5,13 @@
 #include "scene/texture.wgsl"
 #include "lib/shapes.wgsl"
 
-// The builders guarantee that no path down both levels is longer (src/scene/bvh.rs).
-const BVH_STACK = 84u;
+// The builders guarantee that no ray needs more (src/scene/bvh/wide.rs).
+const BVH_STACK = 96u;
+
+// What is left to do for a ray is a number: below LEAVE a node, above DONE a leaf.
+const LEAVE = 0x7ffffffeu; // the bottom level is done: back to world space
+const DONE = 0x7fffffffu;
+const NO_CHILD = 3.4e38; // farther than anything
 
 const TRIANGLE_DOUBLE_SIDED = 1u;
 const TRIANGLE_ALPHA_MASK = 2u;
@@ -138,86 +143,163 @@ fn intersect_triangle(index: u32, instance: u32, origin: vec3f, direction: vec3f
     *hit = Hit(t, index, uv, instance);
 }
 
-// Where the ray enters the node's box, or a huge number if it misses it within [0, t_max].
-fn intersect_box(node: u32, origin: vec3f, inverse: vec3f, t_max: f32) -> f32 {
-    let a = (nodes[node].min - origin) * inverse;
-    let b = (nodes[node].max - origin) * inverse;
-    let near = min(a, b);
-    let far = max(a, b);
-    let enter = max(max(near.x, near.y), max(near.z, 0.0));
-    // Two ulps wider, so that rounding never loses a box (Ize 2013).
-    let leave = min(min(far.x, far.y), min(far.z, t_max)) * 1.0000004;
-    return select(3.4e38, enter, enter <= leave);
-}
-
 // 1 / direction, without infinities: 0 * inf would be NaN in the slab test.
 fn safe_inverse(direction: vec3f) -> vec3f {
     return 1.0 / select(direction, vec3f(1e-20), abs(direction) < vec3f(1e-20));
 }
 
-// The closest hit with 0 < t < t_max, or, with `any_hit`, whichever is found first. Distances are the same in the space
-// of every mesh, for the ray's direction is not normalised on the way there. `top_level` is the scene's root, that of this
-// frame or of the previous one.
-fn traverse_from(top_level: u32, world_origin: vec3f, world_direction: vec3f, t_max: f32, any_hit: bool) -> Hit {
-    rays_traced += 1u;
-    var origin = world_origin;
-    var direction = world_direction;
-    var inverse = safe_inverse(direction);
-    var hit = Hit(t_max, NONE, vec2f(0.0), 0u);
-    var stack: array<u32, BVH_STACK>;
-    var depth = 0u;
-    var node = select(0u, top_level, scene_has_instances);
-    // The instance whose bottom level is walked, and the stack's depth when it was entered.
-    var instance = select(0u, NONE, scene_has_instances);
-    var floor_depth = 0u;
-    if intersect_box(node, origin, inverse, t_max) >= 3.4e38 {
-        return hit;
+// The four bytes of a word as numbers.
+fn bytes(word: u32) -> vec4f {
+    return vec4f(unpack4xU8(word));
+}
+
+// The next thing to do; the stack keeps (node, child), for the child itself is read only when its turn comes.
+fn bvh_pop(stack: ptr<function, array<u32, BVH_STACK>>, depth: ptr<function, u32>) -> u32 {
+    if *depth == 0u {
+        return DONE;
     }
-    loop {
-        let count = nodes[node].count;
-        let first = nodes[node].first;
-        if count > 0u {
-            if scene_has_instances && instance == NONE {
-                instance = first;
-                floor_depth = depth;
-                origin = instance_point(instance, TO_OBJECT, world_origin);
-                direction = instance_vector(instance, TO_OBJECT, world_direction);
-                inverse = safe_inverse(direction);
-                node = instance_texel(instance, 6u).x;
-                continue;
-            }
-            for (var i = first; i < first + count; i += 1u) {
-                intersect_triangle(i, instance, origin, direction, &hit);
+    *depth -= 1u;
+    let entry = (*stack)[*depth];
+    if scene_has_instances && entry == LEAVE {
+        return LEAVE;
+    }
+    return nodes[entry >> 2u].children[entry & 3u];
+}
+
+// Tests the boxes of a node's four children, stacks those that the ray meets within [0, t_max], the nearest last, and gives
+// the nearest. Planes are moved apart by more than all rounding, that of `inverse` included, can move them: no box is lost.
+fn bvh_visit(
+    node: u32, origin: vec3f, inverse: vec3f, t_max: f32,
+    stack: ptr<function, array<u32, BVH_STACK>>, depth: ptr<function, u32>
+) -> u32 {
+    let grid = nodes[node].grid;
+    let a = nodes[node].planes_0;
+    let b = nodes[node].planes_1;
+    let steps = vec3f(
+        bitcast<f32>((grid.w & 0xffu) << 23u), bitcast<f32>((grid.w & 0xff00u) << 15u), bitcast<f32>((grid.w & 0xff0000u) << 7u)
+    ) * inverse;
+    let start = (bitcast<vec3f>(grid.xyz) - origin) * inverse;
+    let margin = abs(start) * 6e-7 + abs(steps) * 2e-4;
+    let near = start - margin;
+    let far = start + margin;
+    let back = inverse < vec3f(0.0);
+    let enter_x = fma(bytes(select(a.x, a.w, back.x)), vec4f(steps.x), vec4f(near.x));
+    let enter_y = fma(bytes(select(a.y, b.x, back.y)), vec4f(steps.y), vec4f(near.y));
+    let enter_z = fma(bytes(select(a.z, b.y, back.z)), vec4f(steps.z), vec4f(near.z));
+    let leave_x = fma(bytes(select(a.w, a.x, back.x)), vec4f(steps.x), vec4f(far.x));
+    let leave_y = fma(bytes(select(b.x, a.y, back.y)), vec4f(steps.y), vec4f(far.y));
+    let leave_z = fma(bytes(select(b.y, a.z, back.z)), vec4f(steps.z), vec4f(far.z));
+    // Above 0, for the bits of positive numbers order as the numbers do.
+    let enter = max(max(enter_x, enter_y), max(enter_z, vec4f(1e-37)));
+    let leave = min(min(leave_x, leave_y), min(leave_z, vec4f(t_max)));
+    let keys = bitcast<vec4u>(select(vec4f(NO_CHILD), enter, enter <= leave));
+    // Sorted with the number of the child in the lowest bits (a network of five comparisons).
+    let k = (keys & vec4u(~3u)) | vec4u(0u, 1u, 2u, 3u);
+    let low = min(k.xz, k.yw);
+    let high = max(k.xz, k.yw);
+    let inner = vec2u(max(low.x, low.y), min(high.x, high.y));
+    let first = min(low.x, low.y);
+    let second = min(inner.x, inner.y);
+    let third = max(inner.x, inner.y);
+    let fourth = max(high.x, high.y);
+    let none = bitcast<u32>(NO_CHILD) & ~3u;
+    if first >= none {
+        return bvh_pop(stack, depth);
+    }
+    let here = node << 2u;
+    if fourth < none {
+        (*stack)[*depth] = here | (fourth & 3u);
+        *depth += 1u;
+    }
+    if third < none {
+        (*stack)[*depth] = here | (third & 3u);
+        *depth += 1u;
+    }
+    if second < none {
+        (*stack)[*depth] = here | (second & 3u);
+        *depth += 1u;
+    }
+    return nodes[node].children[first & 3u];
+}
+
+// A ray on its way through the tree.
+struct Walk {
+    world_origin: vec3f,
+    next: u32, // what to do: a node, a leaf, LEAVE or DONE
+    world_direction: vec3f,
+    depth: u32, // entries of the stack
+    // The ray in the space of the bottom level that is walked: that of `instance`, or of the world (NONE).
+    origin: vec3f,
+    instance: u32,
+    direction: vec3f,
+    inverse: vec3f,
+    hit: Hit,
+}
+
+// `top_level` is the scene's root, that of this frame or of the previous one.
+fn walk_start(top_level: u32, origin: vec3f, direction: vec3f, t_max: f32) -> Walk {
+    rays_traced += 1u;
+    let next = select(0u, top_level, scene_has_instances);
+    let instance = select(0u, NONE, scene_has_instances);
+    let hit = Hit(t_max, NONE, vec2f(0.0), 0u);
+    return Walk(origin, next, direction, 0u, origin, instance, direction, safe_inverse(direction), hit);
+}
+
+// At most two nodes and then a leaf. Lanes that go different ways meet again after each turn, and a turn costs more than
+// its nodes (docs/performance.md).
+fn walk_turn(walk: ptr<function, Walk>, stack: ptr<function, array<u32, BVH_STACK>>, any_hit: bool) {
+    var next = (*walk).next;
+    var depth = (*walk).depth;
+    var hit = (*walk).hit;
+    if next < LEAVE {
+        next = bvh_visit(next, (*walk).origin, (*walk).inverse, hit.t, stack, &depth);
+    }
+    if next < LEAVE {
+        next = bvh_visit(next, (*walk).origin, (*walk).inverse, hit.t, stack, &depth);
+    }
+    if next > DONE {
+        let item = next & 0x0fffffffu;
+        if scene_has_instances && (*walk).instance == NONE {
+            (*walk).instance = item;
+            (*walk).origin = instance_point(item, TO_OBJECT, (*walk).world_origin);
+            (*walk).direction = instance_vector(item, TO_OBJECT, (*walk).world_direction);
+            (*walk).inverse = safe_inverse((*walk).direction);
+            (*stack)[depth] = LEAVE;
+            depth += 1u;
+            next = instance_texel(item, 6u).x;
+        } else {
+            let end = item + ((next >> 28u) & 7u) + 1u;
+            for (var i = item; i < end; i += 1u) {
+                intersect_triangle(i, (*walk).instance, (*walk).origin, (*walk).direction, &hit);
             }
             if any_hit && hit.triangle != NONE {
-                return hit;
-            }
-        } else {
-            let left = intersect_box(first, origin, inverse, hit.t);
-            let right = intersect_box(first + 1u, origin, inverse, hit.t);
-            let left_first = left <= right;
-            if min(left, right) < 3.4e38 {
-                node = select(first + 1u, first, left_first);
-                if max(left, right) < 3.4e38 && depth < BVH_STACK {
-                    stack[depth] = select(first, first + 1u, left_first);
-                    depth += 1u;
-                }
-                continue;
+                next = DONE;
+            } else {
+                next = bvh_pop(stack, &depth);
             }
         }
-        if scene_has_instances && instance != NONE && depth == floor_depth {
-            instance = NONE;
-            origin = world_origin;
-            direction = world_direction;
-            inverse = safe_inverse(direction);
-        }
-        if depth == 0u {
-            break;
-        }
-        depth -= 1u;
-        node = stack[depth];
     }
-    return hit;
+    if scene_has_instances && next == LEAVE {
+        (*walk).instance = NONE;
+        (*walk).origin = (*walk).world_origin;
+        (*walk).direction = (*walk).world_direction;
+        (*walk).inverse = safe_inverse((*walk).direction);
+        next = bvh_pop(stack, &depth);
+    }
+    (*walk).next = next;
+    (*walk).depth = depth;
+    (*walk).hit = hit;
+}
+
+// The closest hit with 0 < t < t_max, or, with `any_hit`, whichever is found first. Distances are the same in the space
+// of every mesh, for the ray's direction is not normalised on the way there.
+fn traverse_from(top_level: u32, origin: vec3f, direction: vec3f, t_max: f32, any_hit: bool) -> Hit {
+    var stack: array<u32, BVH_STACK>;
+    var walk = walk_start(top_level, origin, direction, t_max);
+    while walk.next != DONE {
+        walk_turn(&walk, &stack, any_hit);
+    }
+    return walk.hit;
 }
 
 // The same in this frame's scene.

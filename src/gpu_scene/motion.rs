@@ -2,10 +2,12 @@
 //! own punctual lights, which come after this frame's; a mesh that changes its shape has two places, used in turn.
 
 use super::GpuScene;
+use super::forest::Forest;
 use crate::gpu::Gpu;
 use crate::scene::FlatScene;
+use crate::scene::bvh::wide;
 use crate::scene::flat::{FlatInstance, levels};
-use crate::scene::gpu_types::{BvhNode, Instance, Light, NONE, Triangle, TriangleAttributes};
+use crate::scene::gpu_types::{BvhNode, Instance, Light, NONE, Triangle, TriangleAttributes, WideNode};
 use crate::scene::stage::{Body, Stage};
 use glam::{Mat4, Vec3, Vec4};
 use std::borrow::Cow;
@@ -15,7 +17,6 @@ const ATTRIBUTE_TEXELS: u64 = size_of::<TriangleAttributes>() as u64 / 16;
 
 /// What is uploaded at first.
 pub(super) struct Arrays<'a> {
-    pub nodes: Cow<'a, [BvhNode]>,
     pub triangles: Cow<'a, [Triangle]>,
     pub attributes: Cow<'a, [TriangleAttributes]>,
     pub instances: Vec<Instance>,
@@ -29,12 +30,14 @@ type Places = [(u32, u32); 2];
 #[derive(Debug)]
 pub(super) struct Motion {
     pub previous_top_level: u32,
+    /// Index in `nodes` of the root of each mesh's bottom level, where it does not deform.
+    roots: Vec<u32>,
     /// Of each body.
     places: Vec<Places>,
     /// Which of the places of every body holds this frame's shape, and which that of the frame before.
     now: usize,
     before: Vec<usize>,
-    /// The top level of this frame, numbered from 0, without places of instances.
+    /// The binary top level of this frame, numbered from 0.
     top_level: Vec<BvhNode>,
     /// What of the stage is uploaded.
     pub version: Option<u64>,
@@ -49,13 +52,12 @@ pub(super) fn triangle_count(scene: &FlatScene) -> usize {
 }
 
 impl Motion {
-    /// Finds a place for everything. Without motion the arrays are the scene's own.
-    pub fn lay_out(scene: &FlatScene) -> (Option<Motion>, Arrays<'_>) {
+    /// Finds a place for everything, in `forest` too. Without motion the arrays are the scene's own.
+    pub fn lay_out<'a>(scene: &'a FlatScene, forest: &mut Forest) -> (Option<Motion>, Arrays<'a>) {
         let transforms: Vec<Mat4> = scene.instances.iter().map(|instance| instance.transform).collect();
-        let roots: Vec<u32> = scene.instances.iter().map(|i| scene.meshes[i.mesh as usize].root).collect();
+        let roots: Vec<u32> = scene.instances.iter().map(|i| forest.roots[i.mesh as usize]).collect();
         let records = records(scene, &transforms, &roots, &vec![0; roots.len()]);
         let mut arrays = Arrays {
-            nodes: Cow::Borrowed(&scene.nodes),
             triangles: Cow::Borrowed(&scene.triangles),
             attributes: Cow::Borrowed(&scene.attributes),
             instances: records,
@@ -64,14 +66,15 @@ impl Motion {
         if scene.rig.is_still() {
             return (None, arrays);
         }
-        let top_nodes = if scene.has_top_level() { 2 * scene.instances.len() - 1 } else { 0 };
-        let previous_top_level = arrays.nodes.len() as u32;
-        let nodes = arrays.nodes.to_mut();
-        nodes.resize(nodes.len() + top_nodes, bytemuck::Zeroable::zeroed());
+        // The top level of this frame is the last of the forest, with its room; that of the frame before needs as much.
+        let nodes = &mut forest.nodes;
+        let previous_top_level = nodes.len() as u32;
+        let room = if scene.has_top_level() { nodes.len() - forest.top_level as usize } else { 0 };
+        nodes.resize(nodes.len() + room, bytemuck::Zeroable::zeroed());
         let mut places = Vec::new();
         for deformer in &scene.deformers.list {
             let mesh = &scene.meshes[deformer.mesh as usize];
-            let capacity = Body::node_capacity(mesh.nodes as usize);
+            let capacity = wide::capacity(Body::node_capacity(mesh.nodes as usize));
             let (triangles, attributes) = (arrays.triangles.to_mut(), arrays.attributes.to_mut());
             let own = mesh.first_triangle as usize..(mesh.first_triangle + mesh.triangles) as usize;
             places.push([
@@ -86,8 +89,16 @@ impl Motion {
         let lights = arrays.lights.to_mut();
         lights.extend_from_within(Stage::punctual(scene));
         let before = vec![0; places.len()];
-        let motion =
-            Motion { previous_top_level, places, now: 0, before, top_level: Vec::new(), version: None, at_rest: false };
+        let motion = Motion {
+            previous_top_level,
+            roots: forest.roots.clone(),
+            places,
+            now: 0,
+            before,
+            top_level: Vec::new(),
+            version: None,
+            at_rest: false,
+        };
         (Some(motion), arrays)
     }
 
@@ -97,12 +108,7 @@ impl Motion {
         self.now = 1 - self.now;
         for (i, (body, places)) in stage.bodies.iter().zip(&self.places).enumerate() {
             let (root, first) = places[self.now];
-            let nodes: Vec<BvhNode> = body
-                .nodes
-                .iter()
-                .map(|node| BvhNode { first: node.first + if node.count == 0 { root } else { first }, ..*node })
-                .collect();
-            write_nodes(gpu, device, root, &nodes);
+            write_nodes(gpu, device, root, &wide::collapse(&body.nodes, 0, root, first).nodes);
             device.write_triangles(gpu, first, &body.triangles);
             device.attributes.write(gpu, u64::from(first) * ATTRIBUTE_TEXELS, &body.attributes);
             // Where triangles have been renumbered, or nothing was before, the frame before is this one.
@@ -126,7 +132,7 @@ impl Motion {
         let roots = |now: bool| -> Vec<u32> {
             let root = |mesh: u32| match body_of(mesh) {
                 Some(i) => self.places[i][if now { self.now } else { self.before[i] }].0,
-                None => scene.meshes[mesh as usize].root,
+                None => self.roots[mesh as usize],
             };
             scene.instances.iter().map(|instance| root(instance.mesh)).collect()
         };
@@ -149,9 +155,9 @@ impl Motion {
                 each.map(|(instance, &to_world)| levels::transformed_box(to_world, bounds(instance.mesh))).collect();
             let now = levels::top_level(&boxes, 0);
             let before = if stage.has_moved() && !self.top_level.is_empty() { &self.top_level } else { &now };
-            write_nodes(gpu, device, device.top_level, &moved(&now, device.top_level, 0));
-            let twins = device.instance_count;
-            write_nodes(gpu, device, self.previous_top_level, &moved(before, self.previous_top_level, twins));
+            write_nodes(gpu, device, device.top_level, &wide::collapse(&now, 0, device.top_level, 0).nodes);
+            let (root, twins) = (self.previous_top_level, device.instance_count);
+            write_nodes(gpu, device, root, &wide::collapse(before, 0, root, twins).nodes);
             self.top_level = now;
         }
 
@@ -165,13 +171,6 @@ impl Motion {
         write_lights(gpu, device, first, &lights);
         write_lights(gpu, device, first_twin, &twins);
     }
-}
-
-/// A top level numbered from 0 as it lies at `root`, its leaves naming instances from `first_instance` on.
-fn moved(nodes: &[BvhNode], root: u32, first_instance: u32) -> Vec<BvhNode> {
-    let place =
-        |node: &BvhNode| BvhNode { first: node.first + if node.count == 0 { root } else { first_instance }, ..*node };
-    nodes.iter().map(place).collect()
 }
 
 /// Emissive triangles of a body know where it lies now.
@@ -189,8 +188,8 @@ fn name_lights(gpu: &Gpu, device: &GpuScene, scene: &FlatScene, body: &Body, fir
     write_lights(gpu, device, instance.first_light, &lights);
 }
 
-fn write_nodes(gpu: &Gpu, device: &GpuScene, first: u32, nodes: &[BvhNode]) {
-    let offset = u64::from(first) * size_of::<BvhNode>() as u64;
+fn write_nodes(gpu: &Gpu, device: &GpuScene, first: u32, nodes: &[WideNode]) {
+    let offset = u64::from(first) * size_of::<WideNode>() as u64;
     gpu.queue.write_buffer(&device.nodes, offset, bytemuck::cast_slice(nodes));
 }
 

@@ -1,4 +1,6 @@
-//! The flattened BVH: built by obvhs, laid out for traversal.
+//! The flattened BVH: a binary tree built by obvhs, which [`wide`] turns into what shaders walk.
+
+pub mod wide;
 
 use super::gpu_types::{BvhNode, Triangle};
 use glam::Vec3;
@@ -7,13 +9,42 @@ use obvhs::bvh2::{Bvh2, leaf_collapser::collapse, reinsertion::ReinsertionOptimi
 use obvhs::ploc::morton::morton_encode_u128_unorm;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
-/// No path from the root is longer than this, in nodes. With [`MAX_TOP_DEPTH`] the size of the traversal's
-/// stack (`shaders/scene/bvh.wgsl`).
+/// No path from the root is longer than this, in nodes.
 pub const MAX_DEPTH: u32 = 60;
 /// No path of a top level is longer than this, in nodes: more than log2 of the instances there can be.
 pub const MAX_TOP_DEPTH: u32 = 24;
 /// Most triangles in a leaf.
 pub const MAX_LEAF: u32 = 4;
+
+/// How much work goes into a tree. Rates of rays and times of building are in `docs/performance.md`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Preset {
+    /// Half the time to build, for rays a twentieth slower: for the page, and for meshes rebuilt while they move.
+    Quick,
+    /// For everything else.
+    Thorough,
+}
+
+impl Preset {
+    /// Both.
+    pub const ALL: [Preset; 2] = [Preset::Quick, Preset::Thorough];
+
+    /// (how far a box looks for its nearest in Morton order, which fraction of the nodes the first pass of reinsertion tries
+    /// to move).
+    fn effort(self) -> (PlocSearchDistance, f32) {
+        match self {
+            Preset::Quick => (PlocSearchDistance::Medium, 0.05),
+            Preset::Thorough => (PlocSearchDistance::High, 0.2),
+        }
+    }
+}
+
+impl Default for Preset {
+    fn default() -> Self {
+        // A page builds with one thread, before its reader.
+        if cfg!(target_arch = "wasm32") { Preset::Quick } else { Preset::Thorough }
+    }
+}
 
 /// A binary BVH over triangles: node 0 is the root, the two children of an inner node are adjacent.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,13 +60,18 @@ pub struct Bvh {
 /// Builds over `triangles`: at least one, all corners finite.
 ///
 /// Clustered bottom-up by obvhs (PLOC, Meister and Bittner 2018), improved by reinsertion (the same, 2018), leaves merged
-/// by SAH. Where clustering would take too long, or the tree comes out deeper than [`MAX_DEPTH`], halves by count are
-/// used instead, whose depth is logarithmic.
+/// by SAH. Where clustering would take too long, or the tree comes out deeper than [`MAX_DEPTH`] or wants a larger stack than
+/// [`wide::MAX_STACK`], halves by count are used instead, whose depth is logarithmic.
 pub fn build(triangles: &[Triangle]) -> Bvh {
+    build_with(triangles, Preset::default())
+}
+
+/// [`build`] with a stated effort.
+pub fn build_with(triangles: &[Triangle], preset: Preset) -> Bvh {
     let boxes: Vec<Aabb> = triangles.iter().map(bounds_of).collect();
     if clusters_quickly(&boxes) {
-        let clustered = layout(&cluster(&boxes));
-        if clustered.depth <= MAX_DEPTH {
+        let clustered = layout(&cluster(&boxes, preset));
+        if clustered.depth <= MAX_DEPTH && wide::collapse(&clustered.nodes, 0, 0, 0).stack <= wide::MAX_STACK {
             return clustered;
         }
     }
@@ -47,8 +83,10 @@ pub fn build_top(boxes: &[[Vec3; 2]]) -> Vec<BvhNode> {
     let boxes: Vec<Aabb> = boxes.iter().map(|&[min, max]| Aabb::new(min.into(), max.into())).collect();
     let mut bvh = halve(&boxes, 1);
     if clusters_quickly(&boxes) {
-        let clustered = layout(&run_ploc(&mut PlocBuilder::with_capacity(boxes.len()), &boxes));
-        if clustered.depth <= MAX_TOP_DEPTH {
+        let clustered =
+            layout(&run_ploc(&mut PlocBuilder::with_capacity(boxes.len()), &boxes, PlocSearchDistance::Medium));
+        let stack = wide::collapse(&clustered.nodes, 0, 0, 0).stack;
+        if clustered.depth <= MAX_TOP_DEPTH && stack <= wide::MAX_TOP_STACK {
             bvh = clustered;
         }
     }
@@ -98,26 +136,25 @@ fn bounds_of(triangle: &Triangle) -> Aabb {
 }
 
 /// Clusters and optimises. obvhs's own one-call builders ask for the time, which panics on wasm; this is what they do.
-fn cluster(boxes: &[Aabb]) -> Bvh2 {
-    /// The fraction of the nodes that the first pass of reinsertion tries to move.
-    const BATCH: f32 = 0.05;
+fn cluster(boxes: &[Aabb], preset: Preset) -> Bvh2 {
     /// Reinsertion can deepen the tree, and panics where its stack, of twice this, is full.
     const STACK_DEPTH: usize = 512;
-    let mut tree = run_ploc(&mut PlocBuilder::with_capacity(boxes.len()), boxes);
+    let (distance, batch) = preset.effort();
+    let mut tree = run_ploc(&mut PlocBuilder::with_capacity(boxes.len()), boxes, distance);
     tree.max_depth = tree.max_depth.max(STACK_DEPTH);
     let mut optimizer = ReinsertionOptimizer::default();
-    optimizer.run(&mut tree, BATCH, None);
+    optimizer.run(&mut tree, batch, None);
     collapse(&mut tree, MAX_LEAF, 1.0);
-    optimizer.run(&mut tree, 2.0 * BATCH, None);
+    optimizer.run(&mut tree, 2.0 * batch, None);
     tree
 }
 
-fn run_ploc(builder: &mut PlocBuilder, boxes: &[Aabb]) -> Bvh2 {
+fn run_ploc(builder: &mut PlocBuilder, boxes: &[Aabb], distance: PlocSearchDistance) -> Bvh2 {
     /// The first passes look only at direct neighbours, which is faster.
     const SINGLE_NEIGHBOR_PASSES: usize = 3;
     let indices = (0..boxes.len() as u32).collect();
     // With 42 bits an axis, a small thing in a large scene is ordered well, too.
-    builder.build(PlocSearchDistance::Medium, boxes, indices, SortPrecision::U128, SINGLE_NEIGHBOR_PASSES)
+    builder.build(distance, boxes, indices, SortPrecision::U128, SINGLE_NEIGHBOR_PASSES)
 }
 
 /// Whether PLOC takes few passes, or the boxes are few.
@@ -150,7 +187,7 @@ fn clusters_quickly(boxes: &[Aabb]) -> bool {
     order.chunks(BLOCK).all(|block| {
         let part: Vec<Aabb> = block.iter().map(|&(_, i)| boxes[i as usize]).chain(corners).collect();
         // obvhs sets this to the number of passes where that is above 96.
-        run_ploc(&mut builder, &part).max_depth <= MAX_PASSES
+        run_ploc(&mut builder, &part, PlocSearchDistance::Medium).max_depth <= MAX_PASSES
     })
 }
 
@@ -230,7 +267,7 @@ mod tests {
         Triangle { p0, p1, p2, ..bytemuck::Zeroable::zeroed() }
     }
 
-    fn soup(count: usize, seed: u64) -> Vec<Triangle> {
+    pub(super) fn soup(count: usize, seed: u64) -> Vec<Triangle> {
         let mut random = Random::new(seed);
         (0..count)
             .map(|_| {
@@ -306,12 +343,12 @@ mod tests {
     }
 
     /// At `at`, in a box of about `size`.
-    fn small(at: Vec3, size: f32) -> Triangle {
+    pub(super) fn small(at: Vec3, size: f32) -> Triangle {
         triangle([at, at + size * Vec3::X, at + size * Vec3::new(0.3, 1.0, 0.2)])
     }
 
     /// Centred at the origin.
-    fn shell(size: f32) -> Triangle {
+    pub(super) fn shell(size: f32) -> Triangle {
         triangle([Vec3::new(-size, -size, -size), Vec3::new(size, -size, size), Vec3::new(0.0, size, 0.0)])
     }
 
@@ -400,7 +437,7 @@ mod tests {
         for (name, triangles) in cases {
             let boxes = boxes_of(&triangles);
             assert!(clusters_quickly(&boxes), "{name}");
-            assert!(layout(&cluster(&boxes)).depth > MAX_DEPTH, "{name} is not hostile enough");
+            assert!(layout(&cluster(&boxes, Preset::Quick)).depth > MAX_DEPTH, "{name} is not hostile enough");
             assert!(checked(&triangles).depth < 10, "{name}");
         }
     }

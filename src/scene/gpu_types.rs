@@ -38,8 +38,9 @@ macro_rules! gpu_struct {
 /// No light, no texture, no hit.
 pub const NONE: u32 = u32::MAX;
 
-gpu_struct! {
-/// One node of the flattened binary BVH: 32 bytes. The two children of an inner node are adjacent.
+/// One node of a binary BVH: what is built, refitted and walked on the CPU. The two children of an inner node are adjacent.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct BvhNode {
     /// Lower corner of the box.
     pub min: Vec3,
@@ -49,6 +50,21 @@ pub struct BvhNode {
     pub max: Vec3,
     /// Number of triangles; 0 for an inner node.
     pub count: u32,
+}
+
+gpu_struct! {
+/// One node of the BVH as shaders walk it: up to four children with boxes of 8 bits a plane, 64 bytes
+/// (`crate::scene::bvh::wide`).
+pub struct WideNode {
+    /// Lower corner of the node's box (three f32), and the biased exponents of the steps of its grid along x, y, z (a byte
+    /// each): a plane is at corner + step * byte.
+    pub grid: [u32; 4],
+    /// Bytes of the four children: lower planes along x, y and z, upper planes along x.
+    pub planes_0: [u32; 4],
+    /// Upper planes along y and z; the rest is unused.
+    pub planes_1: [u32; 4],
+    /// Inner child: its index. Leaf: `LEAF`, (items - 1) << 28, and the first triangle or instance.
+    pub children: [u32; 4],
 }
 }
 

@@ -1,4 +1,5 @@
-//! Ray queries on the CPU: the same arithmetic as `shaders/scene/bvh.wgsl`, which tests compare with it.
+//! Ray queries on the CPU, through the binary tree: triangles are tested as in `shaders/scene/bvh.wgsl`, which tests compare
+//! with it.
 
 use super::gpu_types::{BvhNode, TRIANGLE_DOUBLE_SIDED, Triangle};
 use super::{FlatScene, Shape, octahedral};

@@ -3,7 +3,7 @@
 use super::flat::face_normal;
 use super::random::Random;
 use super::sky::Sky;
-use super::{Environment, PunctualKind, PunctualLight, Scene};
+use super::{Environment, PunctualKind, PunctualLight, Scene, TextureRef};
 use crate::error::Result;
 use glam::Vec3;
 
@@ -70,7 +70,8 @@ impl Scene {
                 mesh.positions.get(corner as usize).map_or(Vec3::NAN, |p| instance.transform.transform_point3(*p))
             };
             // As flattening leaves it out, a triangle without area does not shine.
-            material.is_some_and(|material| material.emissive != Vec3::ZERO)
+            material
+                .is_some_and(|material| material.emissive != Vec3::ZERO && !self.is_black(material.emissive_texture))
                 && mesh
                     .indices
                     .as_chunks()
@@ -83,6 +84,12 @@ impl Scene {
             || self.environment.as_ref().is_some_and(bright)
             || self.sun.is_some_and(|sun| sun.irradiance != Vec3::ZERO)
             || self.instances.iter().any(emits)
+    }
+
+    /// Whether there is a texture and it is black all over.
+    fn is_black(&self, reference: Option<TextureRef>) -> bool {
+        let texture = reference.and_then(|reference| self.textures.get(reference.texture as usize));
+        texture.is_some_and(|texture| texture.pixels.as_chunks().0.iter().all(|[r, g, b, _]| [*r, *g, *b] == [0; 3]))
     }
 
     /// The box of all placed vertices, or one of a metre if there are none or all are at one point.
@@ -150,6 +157,31 @@ mod tests {
         scene.ensure_light(3, 0);
         assert_eq!(scene.lights.len(), 3);
         assert!(scene.lights.iter().all(|light| light.intensity.min_element() > 1e-3));
+    }
+
+    #[test]
+    fn a_black_emissive_texture_is_no_light() {
+        for (value, lit) in [(0, false), (1, true)] {
+            let mut scene = builtin::make("cornell").unwrap();
+            scene.textures.push(crate::scene::Texture {
+                name: String::new(),
+                width: 2,
+                height: 1,
+                pixels: std::sync::Arc::new(vec![0, 0, 0, 255, 0, value, 0, 255]),
+                wrap: [crate::scene::Wrap::Repeat; 2],
+                linear_filter: true,
+            });
+            let reference = TextureRef {
+                texture: scene.textures.len() as u32 - 1,
+                uv_set: 0,
+                offset: glam::Vec2::ZERO,
+                rotation: 0.0,
+                scale: glam::Vec2::ONE,
+            };
+            scene.materials.iter_mut().for_each(|material| material.emissive_texture = Some(reference));
+            scene.ensure_light(0, 0);
+            assert_eq!(scene.environment.is_none(), lit);
+        }
     }
 
     #[test]

@@ -2,11 +2,14 @@
 
 use crate::failure::Result;
 use crate::session::{Options, PassReport, Session};
-use crate::{progress, report};
+use crate::{bench_rays, progress, report};
 
 /// Measure the GPU time of each pass and the rays a second.
 #[derive(clap::Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct Args {
+    #[command(subcommand)]
+    what: Option<What>,
     /// A .glb, .gltf, .obj or .restir file, or builtin:NAME (see `restir scenes`).
     #[arg(value_name = "SCENE", default_value = "builtin:cornell")]
     scene: String,
@@ -21,6 +24,11 @@ pub struct Args {
     /// Print JSON.
     #[arg(long)]
     json: bool,
+}
+
+#[derive(clap::Subcommand)]
+enum What {
+    Rays(bench_rays::Args),
 }
 
 #[derive(serde::Serialize)]
@@ -43,6 +51,9 @@ struct Report<'a> {
 }
 
 pub fn run(args: &Args) -> Result<()> {
+    if let Some(What::Rays(args)) = &args.what {
+        return bench_rays::run(args);
+    }
     let mut session = Session::open(&args.scene, &args.options)?;
     let bar = progress::bar(u64::from(args.warm_up) + u64::from(args.frames)).with_message("frames");
     for _ in 0..args.warm_up {

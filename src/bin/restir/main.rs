@@ -1,12 +1,14 @@
 //! The command line: render, compare, and ask what there is.
 
 mod bench;
+mod bench_rays;
 mod compare;
 mod cook;
 mod failure;
 mod info;
 mod options;
 mod progress;
+mod ray_sets;
 mod render;
 mod report;
 mod scene;

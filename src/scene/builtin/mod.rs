@@ -4,6 +4,7 @@ mod area_lights;
 mod cornell;
 mod furnace;
 mod glossy_spheres;
+mod hall;
 mod many_lights;
 mod materials;
 mod motion;
@@ -66,6 +67,12 @@ pub const ALL: &[BuiltinInfo] = &[
         example: "many-lights:10000",
     },
     BuiltinInfo {
+        name: "hall",
+        title: "Crowded hall",
+        doc: "A closed hall full of displaced spheres and boxes under square lamps, of about N triangles (10,000 to 8,000,000).",
+        example: "hall:50000",
+    },
+    BuiltinInfo {
         name: "glossy-spheres",
         title: "Glossy spheres",
         doc: "Spheres from smooth to rough and from plastic to metal, under three panels and a dim sky.",
@@ -99,6 +106,9 @@ pub fn make(name: &str) -> Result<Scene> {
     if let Some(count) = name.strip_prefix("many-lights:") {
         return many_lights::many_lights(count);
     }
+    if let Some(count) = name.strip_prefix("hall:") {
+        return hall::hall(count);
+    }
     match name {
         "cornell" => Ok(cornell::cornell()),
         "cornell-64" => Ok(cornell::cornell_64()),
@@ -107,6 +117,7 @@ pub fn make(name: &str) -> Result<Scene> {
         "many-lights" => {
             Err(Error::bad_value("many-lights:N", "the number of lights is missing, as in many-lights:10000"))
         }
+        "hall" => Err(Error::bad_value("hall:N", "the number of triangles is missing, as in hall:50000")),
         "area-lights" => Ok(area_lights::area_lights()),
         "glossy-spheres" => Ok(glossy_spheres::glossy_spheres()),
         "materials" => Ok(materials::materials()),

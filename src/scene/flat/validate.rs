@@ -3,6 +3,7 @@
 use super::mips::{level_count, side};
 use super::packing::{MAX_ARRAYS, MAX_LAYERS, MAX_SIDE};
 use super::{FlatEnvironment, FlatScene, TextureArray};
+use crate::scene::bvh::wide::MAX_ITEMS;
 use crate::scene::bvh::{MAX_DEPTH, MAX_TOP_DEPTH};
 use crate::scene::gpu_types::{
     LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, Material, MaterialExtensions, NONE, TextureSlot, Triangle,
@@ -111,6 +112,7 @@ fn tree(scene: &FlatScene, range: Range<u32>, items: Range<u32>, max_depth: u32)
             must(node.min.is_finite() && node.max.is_finite(), "a box that is not finite")?;
             must(depths[i] != 0, "belongs to no node before it")?;
             if node.count != 0 {
+                must(node.count <= MAX_ITEMS, "a leaf of too many")?;
                 let end = node.first.checked_add(node.count);
                 let within = node.first >= items.start && end.is_some_and(|end| end <= items.end);
                 return must(within, "triangles out of range").map(|()| None);
