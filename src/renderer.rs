@@ -528,12 +528,12 @@ impl Renderer {
 
     /// Goes on to this frame's moment. Where time stands still, nothing has moved since the frame before.
     fn advance_time(&mut self) {
-        self.previous_time = self.time;
         if !std::mem::take(&mut self.time_was_set) && !self.accumulate {
             self.time += self.speed * FRAME_TIME;
         }
+        // Whatever time was set to since, the frame before is what was shown.
+        self.previous_time = if self.frame_index == 0 { self.time } else { self.stage.time() };
         if self.frame_index == 0 {
-            self.previous_time = self.time;
             self.stage.start(&self.scene, self.clip, self.time);
         } else {
             self.stage.step(&self.scene, self.clip, self.time);

@@ -82,7 +82,7 @@ impl Stage {
 
     /// Goes to `time` of animation `clip` as if nothing had been before.
     pub fn start(&mut self, scene: &FlatScene, clip: usize, time: f64) {
-        if !scene.rig.is_still() && (clip, time) != (self.clip, self.time) {
+        if (clip, time) != (self.clip, self.time) {
             self.take(scene, clip, time);
         }
         self.rest();
@@ -91,11 +91,10 @@ impl Stage {
     /// Goes on to `time` of animation `clip`; where everything was becomes the frame before.
     pub fn step(&mut self, scene: &FlatScene, clip: usize, time: f64) {
         self.rest();
-        if scene.rig.is_still() || (clip, time) == (self.clip, self.time) {
-            return;
+        if (clip, time) != (self.clip, self.time) {
+            self.take(scene, clip, time);
+            self.moved = !scene.rig.is_still();
         }
-        self.take(scene, clip, time);
-        self.moved = true;
     }
 
     /// The punctual lights among those of a scene.
@@ -103,6 +102,11 @@ impl Stage {
         let first = (scene.first_punctual as usize).min(scene.lights.len());
         let is_punctual = |light: &&Light| (LIGHT_POINT..=LIGHT_DIRECTIONAL).contains(&light.kind);
         first..first + scene.lights[first..].iter().take_while(is_punctual).count()
+    }
+
+    /// The moment, in seconds.
+    pub fn time(&self) -> f64 {
+        self.time
     }
 
     /// Another number whenever anything has been moved.
@@ -130,6 +134,9 @@ impl Stage {
 
     fn take(&mut self, scene: &FlatScene, clip: usize, time: f64) {
         (self.clip, self.time) = (clip, time);
+        if scene.rig.is_still() {
+            return;
+        }
         self.version += 1;
         self.pose = scene.rig.pose(clip, time);
         for placement in &scene.rig.instances {

@@ -10,13 +10,13 @@ use crate::scene::{Deformation, Influence};
 use glam::Vec3;
 use gltf::json;
 use json::mesh::{Primitive, Semantic};
-use json::validation::Checked;
 
 /// Most sets of four joints that are looked for.
 const MAX_SETS: u32 = 4;
 
 /// A primitive whose deformation is read.
 pub(super) struct Reader<'a> {
+    pub primitive: &'a super::mesh::Reader<'a>,
     pub document: &'a Document<'a>,
     pub buffers: &'a Buffers<'a>,
     pub source: &'a Primitive,
@@ -33,14 +33,12 @@ impl Reader<'_> {
         let mut repaired = 0;
         let mut targets = Vec::new();
         for (i, target) in self.source.targets.iter().flatten().enumerate() {
-            let open = |name: &str, index: Option<json::Index<json::Accessor>>, budget: &mut Budget| {
-                index
-                    .map(|index| self.open(&format!("targets[{i}].{name}"), index.value(), &accessor::POSITION, budget))
-                    .transpose()
+            let mut open = |name: &str, index: Option<json::Index<json::Accessor>>, shape: &accessor::Shape| {
+                index.map(|index| self.open(&format!("targets[{i}].{name}"), index.value(), shape, budget)).transpose()
             };
-            let positions = open("POSITION", target.positions, budget)?;
-            let normals = open("NORMAL", target.normals, budget)?;
-            let tangents = open("TANGENT", target.tangents, budget)?;
+            let positions = open("POSITION", target.positions, &accessor::POSITION)?;
+            let normals = open("NORMAL", target.normals, &accessor::NORMAL)?;
+            let tangents = open("TANGENT", target.tangents, &accessor::NORMAL)?;
             budget.charge(self.document, sources.len() as u64 * size_of::<Displacement>() as u64)?;
             let mut read = |elements: &Option<Elements>, source: u32| {
                 let read = elements.as_ref().map_or([0.0; 3], |e| e.vector::<3>(source as usize, 0.0));
@@ -82,12 +80,11 @@ impl Reader<'_> {
     fn influences(&self, budget: &mut Budget, sources: &[u32], warnings: &mut Vec<String>) -> Result<Vec<Influence>> {
         let mut sets = Vec::new();
         for set in 0..MAX_SETS {
-            let find = |semantic| self.source.attributes.get(&Checked::Valid(semantic)).map(|index| index.value());
-            match (find(Semantic::Joints(set)), find(Semantic::Weights(set))) {
-                (Some(joints), Some(weights)) => sets.push((
-                    self.open(&format!("attributes.JOINTS_{set}"), joints, &accessor::JOINTS, budget)?,
-                    self.open(&format!("attributes.WEIGHTS_{set}"), weights, &accessor::WEIGHTS, budget)?,
-                )),
+            let count = Some(self.count);
+            let joints = self.primitive.attribute(budget, Semantic::Joints(set), &accessor::JOINTS, count)?;
+            let weights = self.primitive.attribute(budget, Semantic::Weights(set), &accessor::WEIGHTS, count)?;
+            match (joints, weights) {
+                (Some(joints), Some(weights)) => sets.push((joints, weights)),
                 (None, None) => break,
                 _ => {
                     let what = format!("JOINTS_{set} and WEIGHTS_{set} come together");

@@ -102,7 +102,7 @@ fn tangents_for(material: Option<&Material>) -> Option<TextureRef> {
 }
 
 /// One primitive and what it takes to read it.
-struct Reader<'a> {
+pub(super) struct Reader<'a> {
     document: &'a Document<'a>,
     buffers: &'a Buffers<'a>,
     source: &'a Primitive,
@@ -157,6 +157,7 @@ impl Reader<'_> {
             None => flat_normals(&mesh),
         };
         let deformation = deformation::Reader {
+            primitive: self,
             document: self.document,
             buffers: self.buffers,
             source: self.source,
@@ -179,7 +180,7 @@ impl Reader<'_> {
     }
 
     /// An attribute, if the primitive has it; it must have `count` elements where that is given.
-    fn attribute(
+    pub(super) fn attribute(
         &self,
         budget: &mut Budget,
         semantic: Semantic,
