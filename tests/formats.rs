@@ -114,6 +114,15 @@ fn broken_draco_is_refused() {
         &["POSITION", "no such attribute"],
     );
     assert_refused(changed(&|json| json["bufferViews"][0]["byteLength"] = json!(40)), "BAD_FILE", &["Draco"]);
+    // Positions that are not compressed, and fewer than the vertices that are.
+    let few = changed(&|json| {
+        json.pointer_mut(&format!("{extension}/attributes")).unwrap().as_object_mut().unwrap().remove("POSITION");
+        for accessor in json["accessors"].as_array_mut().unwrap() {
+            accessor["count"] = json!(5);
+        }
+        json["meshes"][0]["primitives"][0]["attributes"] = json!({"POSITION": 0});
+    });
+    assert_refused(few, "BAD_FILE", &["more vertices than the 5 positions"]);
     // More than is allowed, told before it is there.
     let bytes = unbase64(&case["encoded"]);
     assert!(draco::decode(&bytes, 500).is_err());

@@ -30,6 +30,9 @@ pub fn to_glb(bytes: &[u8], resolve: Resolve) -> Result<Converted> {
     let resolve = RefCell::new(resolve);
     let warnings = RefCell::new(Vec::new());
     // Comments and names may be in any encoding; numbers are not.
+    if bytes.contains(&0) {
+        return Err(broken("OBJ: it is not text"));
+    }
     let text = String::from_utf8_lossy(bytes);
     check_indices(&text)?;
     let library = |path: &Path| {

@@ -210,7 +210,10 @@ impl Reader<'_> {
         let mode = self.document.valid(&self.source.mode, &format!("{}.mode", self.place))?;
         let place = format!("{}.indices", self.place);
         if let Some(draco) = &self.draco {
-            // Checked by the decoder; a strip becomes a list by compression.
+            // Always a list, whatever the mode says. Below the number of its own vertices, but positions may not be among them.
+            if draco.indices().iter().any(|&index| index as usize >= vertices) {
+                return Err(self.document.bad(place, format!("Draco has more vertices than the {vertices} positions")));
+            }
             return Ok(Some(draco.indices().to_vec()).filter(|indices| !indices.is_empty()));
         }
         let indices = match self.source.indices {
