@@ -412,7 +412,8 @@ mod tests {
             let start = Instant::now();
             assert!(clusters_quickly(&boxes_of(&triangles)), "{name}");
             let bvh = checked(&triangles);
-            assert!(start.elapsed() < Duration::from_secs(3), "{name}: {:?}", start.elapsed());
+            // Clustering that has become quadratic takes minutes; a busy machine must not look like that.
+            assert!(start.elapsed() < Duration::from_secs(15), "{name}: {:?}", start.elapsed());
             let halves = cost(&halve(&boxes_of(&triangles), MAX_LEAF).nodes);
             assert!(cost(&bvh.nodes) < halves, "{name}: {} {halves}", cost(&bvh.nodes));
         }
