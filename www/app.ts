@@ -112,6 +112,7 @@ class App {
 
   private flatten(source: SceneSource, surroundings: Surroundings | undefined): Promise<Loaded> {
     const { lights, seed } = this.state;
+    showProgress(0, 'Loading');
     return this.loader.load(this.compiled, { source, surroundings, lights, seed }, showProgress);
   }
 
