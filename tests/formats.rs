@@ -342,6 +342,11 @@ fn lying_pictures_are_refused() {
     }
     u32_at(&mut etc1s, globals + 4, u32::MAX);
     assert!(matches!(picture::decode(&etc1s, LIMITS), Err(Fault::Broken(what)) if what.contains("codebook")));
+    // A frame that is larger than the picture it belongs to.
+    let mut frame = data("lossy.webp");
+    let at = frame.windows(3).position(|code| code == [0x9d, 0x01, 0x2a]).unwrap() + 3;
+    frame[at..at + 4].copy_from_slice(&[0xff, 0x3f, 0xff, 0x3f]);
+    assert!(matches!(picture::decode(&frame, LIMITS), Err(Fault::Broken(what)) if what.contains("16383 x 16383")));
     let mut webp = data("lossless.webp");
     webp.truncate(40);
     assert!(picture::decode(&webp, LIMITS).is_err());

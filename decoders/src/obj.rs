@@ -91,8 +91,9 @@ fn check_indices(text: &str) -> Result<()> {
         if !matches!(words.next(), Some("f" | "l" | "p")) {
             continue;
         }
-        let absurd =
-            |index: &str| index.parse::<i64>().map_or(index.len() > 18, |index| index.abs() > i64::from(i32::MAX));
+        let absurd = |index: &str| {
+            index.parse::<i64>().map_or(index.len() > 18, |index| index.unsigned_abs() > u64::from(u32::MAX))
+        };
         if let Some(index) = words.flat_map(|corner| corner.split('/')).find(|index| absurd(index)) {
             return Err(broken(format!("OBJ: line {number}: {} is no index", tidy(index))));
         }

@@ -56,6 +56,7 @@ fn decode_webp(bytes: &[u8], limits: Limits) -> Result<Picture> {
     let mut decoder = image_webp::WebPDecoder::new(Cursor::new(bytes)).map_err(error)?;
     let (width, height) = decoder.dimensions();
     check_size(width, height, limits)?;
+    check_frames(bytes.get(12..).unwrap_or_default(), true, limits)?;
     decoder.set_memory_limit(usize::try_from(limits.bytes).unwrap_or(usize::MAX));
     let size = decoder.output_buffer_size().ok_or_else(|| broken("WebP: too large"))?;
     let mut pixels = vec![0; size];
@@ -64,6 +65,30 @@ fn decode_webp(bytes: &[u8], limits: Limits) -> Result<Picture> {
         pixels = pixels.as_chunks::<3>().0.iter().flat_map(|&[r, g, b]| [r, g, b, 255]).collect();
     }
     Ok(Picture { width, height, pixels })
+}
+
+/// Checks the sizes that frames give themselves, for which the decoder allocates whatever the file's header says. Only the
+/// outermost chunks may hold others. Source:
+/// RFC 9649, sections 2.3 (chunks), 2.7.1.1 (`ANMF`) and 3.4 (`VP8L`); RFC 6386, section 9.1 (`VP8 `).
+fn check_frames(mut chunks: &[u8], outermost: bool, limits: Limits) -> Result<()> {
+    while let (Some(name), Some(length)) = (chunks.get(..4), u32_at(chunks, 4)) {
+        let body = chunks.get(8..).unwrap_or_default();
+        let frame = body.get(..length as usize).unwrap_or(body);
+        let size = match name {
+            b"ANMF" if outermost => {
+                check_frames(frame.get(16..).unwrap_or_default(), false, limits)?;
+                None
+            }
+            b"VP8 " => u32_at(frame, 6).map(|sides| (sides & 0x3fff, sides >> 16 & 0x3fff)),
+            b"VP8L" => u32_at(frame, 1).map(|sides| ((sides & 0x3fff) + 1, (sides >> 14 & 0x3fff) + 1)),
+            _ => None,
+        };
+        if let Some((width, height)) = size {
+            check_size(width, height, limits)?;
+        }
+        chunks = body.get((length as usize).saturating_add(length as usize & 1)..).unwrap_or_default();
+    }
+    Ok(())
 }
 
 impl Picture {

@@ -121,8 +121,10 @@ pub fn eval_gpu(
         gpu_scene
     });
     let frame_uniform = gpu.uniform("frame", size_of::<frame::Frame>() as u64);
-    if let Some(scene) = scene {
-        gpu.queue.write_buffer(&frame_uniform, 0, bytemuck::bytes_of(&frame_of(scene, &scene.cameras[0])));
+    if let (Some(scene), Some(gpu_scene)) = (scene, &gpu_scene) {
+        // On the device the root lies elsewhere than in the scene.
+        let frame = frame::Frame { top_level: gpu_scene.top_level(), ..frame_of(scene, &scene.cameras[0]) };
+        gpu.queue.write_buffer(&frame_uniform, 0, bytemuck::bytes_of(&frame));
     }
 
     let mut recorder = Recorder::new(gpu, None);
@@ -143,7 +145,7 @@ pub fn eval_gpu(
     bytemuck::pod_collect_to_vec(&bytes)
 }
 
-/// The first frame of a scene.
+/// The first frame of a scene without a top level.
 pub fn frame_of(scene: &FlatScene, camera: &Camera) -> frame::Frame {
     let camera = frame::camera_view(camera, SIZE.into());
     frame::Frame {
@@ -153,7 +155,6 @@ pub fn frame_of(scene: &FlatScene, camera: &Camera) -> frame::Frame {
         max_depth: 1,
         light_count: scene.lights.len() as u32,
         environment_light: environment_light(scene),
-        top_level: scene.root(),
         sun_light: sun_light(scene),
         environment_turn: glam::Vec2::X,
         previous_environment_turn: glam::Vec2::X,

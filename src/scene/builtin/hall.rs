@@ -60,9 +60,11 @@ pub(super) fn hall(count: &str) -> Result<Scene> {
         shapes::append(&mut lamps, &shapes::parallelogram(corner, Vec3::X * LAMP_SIZE, Vec3::Z * LAMP_SIZE, lamp));
     }
     place(&mut scene, lamps, Mat4::IDENTITY);
-    let each = count / OBJECTS as u32;
+    let mut missing = count;
     for i in 0..OBJECTS {
-        let mut mesh = object(i, each);
+        // Each is of about as many as asked; what it is off by is shared by those that follow.
+        let mut mesh = object(i, missing / (OBJECTS - i) as u32);
+        missing = missing.saturating_sub(mesh.indices.len() as u32 / 3);
         mesh.material = 2 + (i % COLORS) as u32;
         place(&mut scene, mesh, Mat4::IDENTITY);
     }
@@ -85,7 +87,7 @@ fn object(index: usize, triangles: u32) -> Mesh {
     };
     let swell = |p: Vec3| 1.0 + amplitude * (wave(p) + 0.35 * wave(5.3 * p) + 0.12 * wave(23.0 * p));
     if index.is_multiple_of(2) {
-        let rings = ((triangles as f32 / 4.0).sqrt().round() as u32).max(3);
+        let rings = (((triangles as f32 + 1.0).sqrt() * 0.5 + 0.5).round() as u32).max(3);
         // Longitude wraps exactly, so that the surface is closed.
         let segments = 2 * rings;
         patches(rings, segments, &|ring, segment| {
