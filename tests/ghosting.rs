@@ -12,14 +12,15 @@ use support::plants::ShaderCopy;
 use support::*;
 
 const SIZE: u32 = 64;
-const TILE: u32 = 32;
+const TILE: u32 = 16;
 const GLOBAL_MARGIN: f64 = 0.004;
+/// Of a tile a quarter as large as there.
 const TILE_MARGIN: f64 = 0.015;
 const Z_95: f64 = 1.645;
 /// Scene time of a frame in seconds, and the moments of the first and the last of a run.
-const STEP: f64 = 0.1;
+const STEP: f64 = 0.2;
 const START: f64 = 0.3;
-const FRAMES: u32 = 6;
+const FRAMES: u32 = 4;
 const END: f64 = START + STEP * (FRAMES - 1) as f64;
 /// Speed at which a frame takes [`STEP`].
 const SPEED: f64 = STEP * 60.0;
@@ -34,10 +35,10 @@ const REUSE: &[(&str, &str)] = &[
     ("temporal_normal_threshold", "0.5"),
 ];
 
-/// `builtin:motion` from above the floor, with no light in view, from a camera that moves with the file's second one.
+/// `builtin:motion`, all of it in view but its lights.
 fn scene() -> Scene {
     let mut scene = restir::scene::builtin::make("motion").unwrap();
-    scene.cameras[0] = Camera::look_at("still", [0.0, 1.5, 2.8].into(), [0.0, 0.3, -0.3].into(), 40f32.to_radians());
+    scene.cameras[0] = Camera::look_at("still", [0.0, 1.2, 3.4].into(), [0.0, 0.35, -0.3].into(), 42f32.to_radians());
     scene
 }
 
@@ -99,7 +100,7 @@ fn estimate(renderer: &mut Renderer, count: u32, frames: u32) -> Vec<(f64, f64)>
 
 fn reference() -> &'static Vec<(f64, f64)> {
     static REFERENCE: OnceLock<Vec<(f64, f64)>> = OnceLock::new();
-    REFERENCE.get_or_init(|| estimate(&mut still(&flatten(&scene()), 0), 8, 200))
+    REFERENCE.get_or_init(|| estimate(&mut still(&flatten(&scene()), 0), 8, 100))
 }
 
 /// Relative difference and its standard error, region by region, with the region's margin.
@@ -123,7 +124,7 @@ fn the_mean_is_right_while_everything_moves() {
     assert!(differences.iter().all(|(d, e, margin)| d.abs() + Z_95 * e < *margin), "not equivalent");
 }
 
-const RUNS: u32 = 96;
+const RUNS: u32 = 128;
 
 #[test]
 fn faults_in_what_is_known_of_the_frame_before_are_caught() {
@@ -138,8 +139,8 @@ fn faults_in_what_is_known_of_the_frame_before_are_caught() {
         (
             "its surfaces are rebuilt where they are now",
             "techniques/restir-di/temporal.wgsl",
-            "    let instance = previous_instance(seen.x);",
-            "    let instance = seen.x;",
+            "previous_instance(seen.x), seen.y,",
+            "seen.x, seen.y,",
         ),
         (
             "its lamps shine where they are now",
@@ -155,7 +156,7 @@ fn faults_in_what_is_known_of_the_frame_before_are_caught() {
         render(&mut renderer, 1);
         gpu.watch_shaders(&folder.0);
         folder.edit(file, old, new);
-        let differences = differences(what, &estimate(&mut renderer, RUNS / 2, FRAMES));
+        let differences = differences(what, &estimate(&mut renderer, RUNS / 4, FRAMES));
         assert_eq!(renderer.shader_problems, Vec::<String>::new());
         assert!(differences.iter().any(|(d, e, margin)| d.abs() - Z_95 * e > *margin), "'{what}' went unnoticed");
     }
@@ -184,7 +185,7 @@ fn moving_pixels(scene: &FlatScene, camera: usize) -> Vec<bool> {
 
 /// The error of the last frame while things move over that when they have stood still, with its standard error.
 fn error_ratio(gpu: &Gpu, scene: &FlatScene, camera: usize, mask: &[bool], plant: Option<&str>) -> (f64, f64) {
-    let truth = render(&mut still(scene, camera), 1500);
+    let truth = render(&mut still(scene, camera), 400);
     let folder = plant.map(|_| ShaderCopy::new());
     let measure = |speed: f64| {
         let mut renderer = playing(gpu, scene, camera, speed);
@@ -195,7 +196,7 @@ fn error_ratio(gpu: &Gpu, scene: &FlatScene, camera: usize, mask: &[bool], plant
                 folder.edit("techniques/restir-di/temporal.wgsl", "let position = previous_position(pixel);", plant);
             }
         }
-        statistics(&errors(&runs(&mut renderer, 12, FRAMES), &truth, mask))[0]
+        statistics(&errors(&runs(&mut renderer, 8, FRAMES), &truth, mask))[0]
     };
     let ((still, s0), (moving, s1)) = (measure(0.0), measure(SPEED));
     let ratio = moving / still;
@@ -203,7 +204,7 @@ fn error_ratio(gpu: &Gpu, scene: &FlatScene, camera: usize, mask: &[bool], plant
 }
 
 /// History is lost where something was hidden before, and what it says is old; beyond that motion may cost nothing.
-const MOST: f64 = 1.6;
+const MOST: f64 = 2.0;
 
 #[test]
 fn history_follows_what_moves() {
@@ -228,7 +229,7 @@ fn history_follows_what_moves() {
         let flat = flatten(&moving);
         let mask = if what == "lights" { vec![true; (SIZE * SIZE) as usize] } else { moving_pixels(&flat, index) };
         let count = mask.iter().filter(|moves| **moves).count();
-        assert!(count > 200, "{what}: {count} pixels move");
+        assert!(count > 100, "{what}: {count} pixels move");
         let (ratio, error) = error_ratio(&gpu(), &flat, index, &mask, None);
         println!("{what}: error {ratio:.2} ± {error:.2} times that at rest, in {count} pixels");
         assert!(ratio + Z_95 * error < MOST, "{what}: the history is of little use");

@@ -281,7 +281,8 @@ fn mutated_files_do_no_harm() {
                 if let Ok(flat) = FlatScene::build(&scene, &mut |_, _| ())
                     && let Err(error) = FlatScene::from_bytes(&flat.to_bytes())
                 {
-                    panic!("what was flattened is refused: {error}");
+                    let header = String::from_utf8_lossy(&flat.to_bytes()[16..1000]).into_owned();
+                    panic!("what was flattened is refused: {error} in {header}");
                 }
             }
             Err(error) => assert!(!error.to_string().contains('\n')),

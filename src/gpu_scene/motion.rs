@@ -107,13 +107,18 @@ impl Motion {
         let before = self.now;
         self.now = 1 - self.now;
         for (i, (body, places)) in stage.bodies.iter().zip(&self.places).enumerate() {
-            let (root, first) = places[self.now];
-            write_nodes(gpu, device, root, &wide::collapse(&body.nodes, 0, root, first).nodes);
-            device.write_triangles(gpu, first, &body.triangles);
-            device.attributes.write(gpu, u64::from(first) * ATTRIBUTE_TEXELS, &body.attributes);
-            // Where triangles have been renumbered, or nothing was before, the frame before is this one.
-            self.before[i] = if stage.has_moved() && !body.rebuilt { before } else { self.now };
-            name_lights(gpu, device, scene, body, first);
+            let upload = |(root, first): (u32, u32), nodes: &[BvhNode], triangles: &[Triangle], attributes: &[_]| {
+                write_nodes(gpu, device, root, &wide::collapse(nodes, 0, root, first).nodes);
+                device.write_triangles(gpu, first, triangles);
+                device.attributes.write(gpu, u64::from(first) * ATTRIBUTE_TEXELS, attributes);
+            };
+            upload(places[self.now], &body.nodes, &body.triangles, &body.attributes);
+            // What is there has other numbers than this frame's.
+            if let Some(shape) = &body.renumbered {
+                upload(places[before], &shape.nodes, &shape.triangles, &shape.attributes);
+            }
+            self.before[i] = if stage.has_moved() { before } else { self.now };
+            name_lights(gpu, device, scene, body, places[self.now].1);
         }
     }
 

@@ -48,13 +48,26 @@ pub struct Body {
     pub attributes: Vec<TriangleAttributes>,
     /// Its bottom level; children and triangles count from its own first.
     pub nodes: Vec<BvhNode>,
-    /// Whether the order of its triangles is another than in the frame before.
-    pub rebuilt: bool,
+    /// Where the order of its triangles is another than in the frame before: its shape in that frame, in the new order.
+    pub renumbered: Option<Shape>,
     corners: Vec<[u32; 3]>,
     /// Expected cost of a ray when the bottom level was built.
     built_cost: f32,
+    /// Whether the bottom level is to be built again before the next shape.
+    is_degraded: bool,
     emits: bool,
     capacity: usize,
+}
+
+/// The triangles of a mesh, their attributes and its bottom level.
+#[derive(Debug, Clone)]
+pub struct Shape {
+    /// In the order of the leaves.
+    pub triangles: Vec<Triangle>,
+    /// Of each triangle.
+    pub attributes: Vec<TriangleAttributes>,
+    /// Children and triangles count from the mesh's own first.
+    pub nodes: Vec<BvhNode>,
 }
 
 impl Stage {
@@ -121,14 +134,14 @@ impl Stage {
 
     /// Whether triangles of the frame before can no longer be told by their numbers.
     pub fn is_renumbered(&self) -> bool {
-        self.bodies.iter().any(|body| body.rebuilt)
+        self.bodies.iter().any(|body| body.renumbered.is_some())
     }
 
     /// Makes the frame before the same as this one.
     fn rest(&mut self) {
         self.previous_transforms.clone_from(&self.transforms);
         self.previous_lights.clone_from(&self.lights);
-        self.bodies.iter_mut().for_each(|body| body.rebuilt = false);
+        self.bodies.iter_mut().for_each(|body| body.renumbered = None);
         self.moved = false;
     }
 
@@ -191,7 +204,8 @@ impl Body {
             built_cost: bvh::cost(&nodes),
             capacity: Body::node_capacity(nodes.len()),
             nodes,
-            rebuilt: false,
+            renumbered: None,
+            is_degraded: false,
             emits: scene.triangles[triangles].iter().any(|triangle| triangle.light != NONE),
         }
     }
@@ -211,27 +225,32 @@ impl Body {
         self.nodes.first().map_or([Vec3::ZERO; 2], |root| [root.min, root.max])
     }
 
-    /// Takes a shape, and refits the bottom level or builds it again.
+    /// Takes a shape and refits the bottom level, which is built anew first if it has degraded too far.
     fn shape(&mut self, deformer: &Deformer, vertices: &[Deformed]) {
+        if std::mem::take(&mut self.is_degraded) {
+            self.renumbered = self.rebuild();
+        }
         write_shape(vertices, &self.corners, deformer.flat == 1, &mut self.triangles, &mut self.attributes);
         bvh::refit(&mut self.nodes, &self.triangles);
         // Lights name their triangles by number: those of a mesh that shines keep their order.
-        let degraded = bvh::cost(&self.nodes) > REBUILD_RATIO * self.built_cost;
-        if self.emits || !degraded {
-            return;
-        }
+        self.is_degraded = !self.emits && bvh::cost(&self.nodes) > REBUILD_RATIO * self.built_cost;
+    }
+
+    /// Builds the bottom level for the shape that it has, and gives that; none where there is no room for so many nodes.
+    fn rebuild(&mut self) -> Option<Shape> {
         let rebuilt = bvh::build(&self.triangles);
         if rebuilt.nodes.len() > self.capacity {
-            // There is no room for it: what was refitted is as good as it gets for a while.
+            // What was refitted is as good as it gets for a while.
             self.built_cost = bvh::cost(&self.nodes);
-            return;
+            return None;
         }
         self.built_cost = bvh::cost(&rebuilt.nodes);
         self.nodes = rebuilt.nodes;
         self.triangles = permuted(&self.triangles, &rebuilt.order);
         self.attributes = permuted(&self.attributes, &rebuilt.order);
         self.corners = permuted(&self.corners, &rebuilt.order);
-        self.rebuilt = true;
+        let (triangles, attributes) = (self.triangles.clone(), self.attributes.clone());
+        Some(Shape { triangles, attributes, nodes: self.nodes.clone() })
     }
 }
 
