@@ -187,9 +187,11 @@ fn name_lights(gpu: &Gpu, device: &GpuScene, scene: &FlatScene, body: &Body, fir
     let mut lights = Vec::new();
     for (i, triangle) in body.triangles.iter().enumerate().filter(|(_, triangle)| triangle.light != NONE) {
         if let Some(light) = scene.lights.get((instance.first_light + triangle.light) as usize) {
-            lights.push(Light { triangle: first_triangle + i as u32, ..*light });
+            lights.push((triangle.light, Light { triangle: first_triangle + i as u32, ..*light }));
         }
     }
+    lights.sort_unstable_by_key(|&(number, _)| number);
+    let lights: Vec<Light> = lights.into_iter().map(|(_, light)| light).collect();
     write_lights(gpu, device, instance.first_light, &lights);
 }
 

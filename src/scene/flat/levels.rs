@@ -219,6 +219,8 @@ impl Levels {
             soup.triangles.push(POINT);
             soup.attributes.push(bytemuck::Zeroable::zeroed());
         }
+        // Until lights are numbered, their place in the scene: the light table must not depend on how a tree orders them.
+        soup.triangles.iter_mut().zip(0..).for_each(|(triangle, place)| triangle.light = place);
         let Bvh { nodes, order, depth } = bvh::build(&soup.triangles);
         self.deformers.corners.extend(order.iter().filter_map(|&i| soup.corners.get(i as usize)));
         let (first_node, first_triangle) = (self.nodes.len() as u32, self.triangles.len() as u32);

@@ -34,36 +34,37 @@ pub(super) fn emitters(
     attributes: &[TriangleAttributes],
     emission: &Emission,
 ) -> Emitters {
-    // Of the emissive triangles of a mesh, by number.
-    let mut emitted: Vec<Vec<f64>> = Vec::with_capacity(meshes.len());
+    // Index and mean emission of the emissive triangles of each mesh, by number: in the order of the scene, which their
+    // `light` holds so far, whatever that of the tree.
+    let mut emitted: Vec<Vec<(u32, f64)>> = Vec::with_capacity(meshes.len());
     for mesh in meshes {
-        let range = mesh.first_triangle as usize..(mesh.first_triangle + mesh.triangles) as usize;
         let mut of_mesh = Vec::new();
-        for (triangle, attributes) in triangles[range.clone()].iter_mut().zip(&attributes[range]) {
+        for i in mesh.first_triangle..mesh.first_triangle + mesh.triangles {
+            let (triangle, attributes) = (&mut triangles[i as usize], &attributes[i as usize]);
             let mean = match triangle.shape() {
                 Shape::Triangles => emission.mean(triangle.material, |set| attributes.uvs(set)),
                 _ => emission.untextured(triangle.material),
             };
+            let place = std::mem::replace(&mut triangle.light, NONE);
             if mean > 0.0 {
-                triangle.light = of_mesh.len() as u32;
-                of_mesh.push(mean);
+                of_mesh.push((place, i, mean));
             }
         }
-        emitted.push(of_mesh);
+        of_mesh.sort_unstable_by_key(|&(place, ..)| place);
+        emitted.push(of_mesh.into_iter().map(|(_, i, mean)| (i, mean)).collect());
+        for (&(i, _), number) in emitted.last().into_iter().flatten().zip(0..) {
+            triangles[i as usize].light = number;
+        }
     }
     let mut emitters = Emitters::new();
     for (index, instance) in instances.iter_mut().enumerate() {
         instance.first_light = emitters.len() as u32;
-        let mesh = &meshes[instance.mesh as usize];
-        for i in mesh.first_triangle..mesh.first_triangle + mesh.triangles {
+        for &(i, mean) in &emitted[instance.mesh as usize] {
             let triangle = &triangles[i as usize];
-            if triangle.light == NONE {
-                continue;
-            }
             let [p0, p1, p2] = [triangle.p0, triangle.p1, triangle.p2].map(|p| instance.transform.transform_point3(p));
             let area = area_factor(triangle.shape()) * (p1 - p0).as_dvec3().cross((p2 - p0).as_dvec3()).length();
             let light = Light { triangle: i, instance: index as u32, ..empty(LIGHT_TRIANGLE) };
-            emitters.push((light, emitted[instance.mesh as usize][triangle.light as usize] * area));
+            emitters.push((light, mean * area));
         }
     }
     emitters

@@ -156,11 +156,10 @@ fn emitters(scene: &FlatScene) -> Result<(), Fault> {
             if triangle.light == NONE {
                 continue;
             }
-            let light = scene.lights.get(expected as usize);
-            let number = expected - instance.first_light;
-            let mutual = light.is_some_and(|l| {
-                l.kind == LIGHT_TRIANGLE && l.triangle == index && l.instance as usize == i && triangle.light == number
-            });
+            let number = instance.first_light.checked_add(triangle.light);
+            let mutual = number
+                .and_then(|number| scene.lights.get(number as usize))
+                .is_some_and(|l| l.kind == LIGHT_TRIANGLE && l.triangle == index && l.instance as usize == i);
             must(mutual, "not the light it says it is").map_err(|what| fault(format!("triangles[{index}]"), what))?;
             expected += 1;
         }
