@@ -106,7 +106,8 @@ fn motion_vectors_find_known_points() {
         for (camera, times) in [(0, [0.2, 0.9]), (1, [0.2, 0.9]), (0, [3.0, 2.2])] {
             let (pixels, motion) = check_vectors(&scene, index, camera, times);
             assert!(pixels > 50, "{what}: {pixels} pixels are too few to tell");
-            assert!(motion > 0.2, "{what} has hardly moved: {motion}");
+            // The bumps of the ball are small.
+            assert!(motion > 0.1, "{what} has hardly moved: {motion}");
         }
     }
 }

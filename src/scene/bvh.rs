@@ -127,7 +127,8 @@ pub fn cost(nodes: &[BvhNode]) -> f32 {
         return nodes.len() as f32;
     }
     let sum: f64 = nodes.iter().map(|node| half_area(node) * f64::from(node.count.max(1))).sum();
-    (sum / root) as f32
+    // A huge node beside a tiny root is still a number, which reports can hold.
+    (sum / root).min(f64::from(f32::MAX)) as f32
 }
 
 fn bounds_of(triangle: &Triangle) -> Aabb {
