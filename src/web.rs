@@ -158,6 +158,10 @@ impl Decoders for DecoderModule {
 }
 
 /// A glTF file as `FlatScene` bytes; `resolve(uri)` gives the bytes of a file beside it, or undefined. For a Worker.
+#[allow(
+    clippy::too_many_arguments,
+    reason = "the Worker calls it with plain values, which cross the boundary one by one"
+)]
 #[wasm_bindgen]
 pub fn flatten_file(
     name: &str,
