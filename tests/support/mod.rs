@@ -3,6 +3,7 @@
 
 pub mod animated;
 pub mod bsdf;
+pub mod equivalence;
 pub mod extensions;
 pub mod gltf_writer;
 pub mod harness;

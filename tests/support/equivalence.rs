@@ -1,0 +1,103 @@
+//! Whether two renderers have the same expectation, by two one-sided tests on means over independent runs.
+
+use super::render;
+use restir::{Image, Renderer};
+use std::fmt;
+
+/// One-sided 95 % quantile of the normal distribution; runs are many enough.
+pub const Z_95: f64 = 1.645;
+
+/// Means over independent runs and their standard errors.
+#[derive(Debug, Clone)]
+pub struct Estimate(pub Vec<(f64, f64)>);
+
+impl Estimate {
+    /// Of each number that a run gives.
+    pub fn of(samples: &[Vec<f64>]) -> Self {
+        let n = samples.len() as f64;
+        let column = |i: usize| {
+            let mean = samples.iter().map(|s| s[i]).sum::<f64>() / n;
+            let variance = samples.iter().map(|s| (s[i] - mean).powi(2)).sum::<f64>() / (n * (n - 1.0));
+            (mean, variance.sqrt())
+        };
+        Estimate((0..samples[0].len()).map(column).collect())
+    }
+
+    /// Of the mean radiance of the picture, then of each of its square tiles, `tile` pixels wide.
+    pub fn radiance(renderer: &mut Renderer, runs: u32, frames: u32, tile: u32) -> Self {
+        let samples: Vec<_> =
+            pictures(renderer, runs, frames).iter().map(|picture| region_means(picture, tile)).collect();
+        Self::of(&samples)
+    }
+}
+
+/// The pictures of independent runs.
+pub fn pictures(renderer: &mut Renderer, runs: u32, frames: u32) -> Vec<Image> {
+    let run = |seed| {
+        renderer.set_seed(1000 + seed);
+        render(renderer, frames)
+    };
+    (0..runs).map(run).collect()
+}
+
+/// Mean radiance of the picture, then of each tile.
+fn region_means(image: &Image, tile: u32) -> Vec<f64> {
+    let columns = image.width / tile;
+    let mut sums = vec![0.0; 1 + (columns * (image.height / tile)) as usize];
+    for (i, pixel) in image.pixels.iter().enumerate() {
+        let value: f64 = pixel.iter().map(|c| f64::from(*c)).sum::<f64>() / 3.0;
+        let (x, y) = (i as u32 % image.width / tile, i as u32 / image.width / tile);
+        sums[0] += value / f64::from(image.width * image.height);
+        sums[1 + (y * columns + x) as usize] += value / f64::from(tile * tile);
+    }
+    sums
+}
+
+/// How much an expectation may be off, relative to it.
+#[derive(Debug, Clone, Copy)]
+pub struct Margins {
+    /// Of the mean over the picture.
+    pub picture: f64,
+    /// Of the mean over a tile.
+    pub tile: f64,
+}
+
+/// Relative difference of each region's mean from the reference's, its standard error, and its margin.
+#[derive(Debug)]
+pub struct Comparison(Vec<(f64, f64, f64)>);
+
+impl Comparison {
+    /// Compares the regions of an estimate with those of the reference.
+    pub fn new(estimate: &Estimate, reference: &Estimate, margins: Margins) -> Self {
+        let regions = estimate.0.iter().zip(&reference.0).enumerate();
+        Comparison(
+            regions
+                .map(|(i, ((mean, error), (truth, noise)))| {
+                    let margin = if i == 0 { margins.picture } else { margins.tile };
+                    (mean / truth - 1.0, error.hypot(*noise) / truth, margin)
+                })
+                .collect(),
+        )
+    }
+
+    /// Whether every mean lies within its margin with 95 % confidence.
+    pub fn is_equivalent(&self) -> bool {
+        self.0.iter().all(|(d, e, margin)| d.abs() + Z_95 * e < *margin)
+    }
+
+    /// Whether a bias lies beyond a margin with 95 % confidence; then a repetition of the test fails far more often than
+    /// nine times in ten.
+    pub fn is_caught(&self) -> bool {
+        self.0.iter().any(|(d, e, margin)| d.abs() - Z_95 * e > *margin)
+    }
+}
+
+impl fmt::Display for Comparison {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        for (i, (difference, error, _)) in self.0.iter().enumerate() {
+            let comma = if i == 0 { "" } else { ", " };
+            write!(f, "{comma}{:+.3}±{:.3} %", 100.0 * difference, 100.0 * error)?;
+        }
+        Ok(())
+    }
+}
