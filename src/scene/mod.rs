@@ -190,6 +190,11 @@ pub struct Material {
 }
 
 impl Material {
+    /// Emitted radiance, W/(m² sr), linear Rec. 709: an unlit surface shines by its base colour, and is no light.
+    pub fn emitted(&self) -> Vec3 {
+        if self.unlit { Vec3::ZERO } else { self.emissive }
+    }
+
     /// Whether rays pass through the surface into a medium below it. Such a surface has two sides, whatever
     /// `double_sided` says.
     pub fn bounds_a_medium(&self) -> bool {

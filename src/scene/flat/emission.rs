@@ -38,18 +38,18 @@ pub(super) struct Emission {
 impl Emission {
     pub(super) fn new(scene: &Scene) -> Self {
         let of = |material: &Material| {
-            let map = material.emissive_texture.filter(|_| material.emissive != Vec3::ZERO).and_then(|reference| {
+            let map = material.emissive_texture.filter(|_| material.emitted() != Vec3::ZERO).and_then(|reference| {
                 let texture = scene.textures.get(reference.texture as usize)?;
                 let block = texture.width.max(texture.height).div_ceil(MAX_SIDE).next_power_of_two();
                 Some(Map {
                     reference,
                     wrap: texture.wrap,
-                    levels: levels(texture, material.emissive, block as usize),
+                    levels: levels(texture, material.emitted(), block as usize),
                     scale: DVec2::new(texture.width.into(), texture.height.into()) / f64::from(block),
                     is_aligned: texture.width.is_power_of_two() && texture.height.is_power_of_two(),
                 })
             });
-            (luminance(material.emissive), map)
+            (luminance(material.emitted()), map)
         };
         Emission { materials: scene.materials.iter().map(of).collect() }
     }

@@ -40,8 +40,7 @@ fn flatten_one(material: &scene::Material, scene: &Scene, find: Find) -> std::re
     let mut slot = |texture, texels| slot(texture, texels, scene, find);
     Ok(Material {
         base_color: material.base_color,
-        // An unlit surface shines, but is no light.
-        emissive: if material.unlit { Vec3::ZERO } else { material.emissive },
+        emissive: material.emitted(),
         metallic: material.metallic,
         roughness: material.roughness,
         normal_scale: material.normal_scale,
