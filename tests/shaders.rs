@@ -5,8 +5,9 @@ mod support;
 
 use glam::UVec2;
 use restir::gpu::recorder::Recorder;
-use restir::gpu::shader::{SceneFeatures, table};
-use restir::gpu::shader_source::{flatten, reflect};
+use restir::gpu::shader::{SceneFeatures, Shader, table};
+use restir::gpu::shader_source::{Flattened, flatten, reflect};
+use restir::gpu::specialize::specialize;
 use restir::params::{FilmParams, ParamKind, Params, RenderParams};
 use restir::{Error, techniques};
 use std::collections::{BTreeMap, BTreeSet};
@@ -114,6 +115,34 @@ fn every_override_is_a_scene_feature() {
     for name in known {
         assert!(table::ALL.iter().any(|shader| shader.overrides.contains(name)), "no shader has the override {name}");
     }
+}
+
+/// What each pass becomes for the plainest scene, for one that has everything, and for those that have one thing, or all but
+/// one: valid, as long in lines as it was, and for the plainest much shorter.
+#[test]
+fn passes_stay_valid_for_every_scene() {
+    let check = |shader: &Shader, value: &dyn Fn(&str) -> bool| {
+        let text = specialize(shader.source, &|name| shader.overrides.contains(&name).then(|| value(name)));
+        assert_eq!(text.lines().count(), shader.source.lines().count(), "{}", shader.file);
+        reflect(&Flattened { text: text.clone(), ..Flattened::default() })
+            .unwrap_or_else(|error| panic!("{}: {error}\n{text}", shader.file));
+        text
+    };
+    for shader in table::ALL {
+        check(shader, &|_| true);
+        check(shader, &|_| false);
+    }
+    // Every feature is in these.
+    for shader in [&table::RESTIR_DI_TEMPORAL, &table::PATH_TRACER_TRACE] {
+        for feature in shader.overrides {
+            check(shader, &|name| name == *feature);
+            check(shader, &|name| name != *feature);
+        }
+    }
+    let functions = |text: &str| text.lines().filter(|line| line.starts_with("fn ")).count();
+    let whole = functions(table::RESTIR_DI_SHADE.source);
+    let plain = functions(&check(&table::RESTIR_DI_SHADE, &|_| false));
+    assert!(plain < whole * 2 / 3, "{plain} of {whole} functions are left");
 }
 
 #[test]

@@ -65,10 +65,10 @@ async function flattenFile({ name, files, choice }: SceneSource & { kind: 'file'
     return { flat: uncook(name, main) };
   }
   if (/\.obj$/i.test(name)) {
-    const { convert_obj } = await fetchDecoders();
+    const decoders = await fetchDecoders();
     try {
-      const { glb, warnings } = convert_obj(main, resolve) as { glb: Uint8Array; warnings: string[] };
-      return { flat: flatten(glb, undefined, warnings) };
+      const { glb, warnings } = decoders.convert_obj(main, resolve) as { glb: Uint8Array; warnings: string[] };
+      return { flat: flatten(glb, decoders, warnings) };
     } catch (error) {
       const { code, message } = toFailure(error);
       throw { code, message: message.startsWith(name) ? message : `${name}: ${message}` };

@@ -1,4 +1,5 @@
-//! The decoders that only some files need: Draco and meshopt geometry, Basis Universal and WebP pictures, Wavefront OBJ.
+//! The decoders that only some files need: Draco and meshopt geometry; PNG, JPEG, WebP and Basis Universal pictures; Wavefront
+//! OBJ.
 //!
 //! Native programs link them. The page keeps them in a wasm module of their own, which its Worker fetches when a file
 //! asks for one, so that nobody else downloads them.

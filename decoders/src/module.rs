@@ -36,7 +36,7 @@ pub fn decode_meshopt(bytes: &[u8], mode: &str, filter: &str, count: u32, stride
     meshopt::decode(bytes, &layout).map_err(js_error)
 }
 
-/// A WebP or KTX2 picture as [`picture::Picture::into_bytes`].
+/// A PNG, JPEG, WebP or KTX2 picture as [`picture::Picture::into_bytes`].
 #[wasm_bindgen]
 pub fn decode_picture(bytes: &[u8], max_side: u32, max_bytes: f64) -> JsResult<Vec<u8>> {
     let limits = picture::Limits { side: max_side, bytes: max_bytes as u64 };

@@ -1,7 +1,8 @@
-//! Pictures: WebP here, KTX2 in [`ktx2`].
+//! Pictures: PNG, JPEG and WebP here, KTX2 in [`ktx2`].
 
 use crate::words::u32_at;
-use crate::{Result, broken, ktx2};
+use crate::{Fault, Result, broken, ktx2};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use std::io::Cursor;
 
 /// A decoded picture.
@@ -24,7 +25,7 @@ pub struct Limits {
     pub bytes: u64,
 }
 
-/// Decodes a WebP or KTX2 file, told apart by their first bytes; only the largest level of a KTX2 is read. The size is
+/// Decodes a PNG, JPEG, WebP or KTX2 file, told apart by their first bytes; only the largest level of a KTX2 is read. The size is
 /// checked before anything is allocated for it.
 ///
 /// # Errors
@@ -37,7 +38,30 @@ pub fn decode(bytes: &[u8], limits: Limits) -> Result<Picture> {
     if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
         return decode_webp(bytes, limits);
     }
-    Err(broken("it is neither WebP nor KTX2"))
+    match image::guess_format(bytes) {
+        Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) => decode_core(bytes, format, limits),
+        Ok(other) => Err(Fault::Unsupported(format!("image format {other:?}"))),
+        Err(_) => Err(broken("it is neither PNG, JPEG, WebP nor KTX2")),
+    }
+}
+
+/// A PNG or JPEG file: what glTF itself knows.
+fn decode_core(bytes: &[u8], format: ImageFormat, limits: Limits) -> Result<Picture> {
+    let error = |error: image::ImageError| broken(error.to_string());
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    let mut decoder_limits = image::Limits::default();
+    decoder_limits.max_image_width = Some(limits.side);
+    decoder_limits.max_image_height = Some(limits.side);
+    decoder_limits.max_alloc = Some(limits.bytes);
+    reader.limits(decoder_limits);
+    let decoder = reader.into_decoder().map_err(error)?;
+    let (width, height) = decoder.dimensions();
+    check_size(width, height, limits)?;
+    if decoder.total_bytes() > limits.bytes {
+        return Err(broken(format!("{width} x {height} texels take more than {} bytes", limits.bytes)));
+    }
+    let pixels = DynamicImage::from_decoder(decoder).map_err(error)?.into_rgba8().into_raw();
+    Ok(Picture { width, height, pixels })
 }
 
 /// Refuses sizes that are 0 or too large.

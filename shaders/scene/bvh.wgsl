@@ -30,6 +30,9 @@ struct Hit {
 var<private> rays_traced: u32 = 0u;
 
 fn triangle_uvs(triangle: u32, uv: vec2f) -> vec4f {
+    if !scene_has_textures {
+        return vec4f(0.0);
+    }
     let a = load_attributes(triangle);
     let w = 1.0 - uv.x - uv.y;
     return vec4f(w * a.uv_a.xy + uv.x * a.uv_a.zw + uv.y * a.uv_b.xy,
@@ -41,7 +44,7 @@ fn unpack_color(color: u32) -> vec4f {
 }
 
 fn triangle_color(triangle: u32, uv: vec2f) -> vec4f {
-    let colors = load_attributes(triangle).colors;
+    let colors = load_colors(triangle);
     return (1.0 - uv.x - uv.y) * unpack_color(colors.x) + uv.x * unpack_color(colors.y) + uv.y * unpack_color(colors.z);
 }
 
@@ -58,8 +61,9 @@ fn shape_of(flags: u32) -> u32 {
     return (flags >> SHAPE_SHIFT) & 3u;
 }
 
+// Asked only where `scene_has_shapes`, in the same condition: so the code of spheres goes with them (src/gpu/specialize.rs).
 fn is_sphere(flags: u32) -> bool {
-    return scene_has_shapes && shape_of(flags) == SHAPE_SPHERE;
+    return shape_of(flags) == SHAPE_SPHERE;
 }
 
 // A primitive that is no triangle. The plane of a flat one as by Möller and Trumbore 1997; it has no neighbours to be

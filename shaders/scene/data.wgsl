@@ -22,9 +22,19 @@ fn attribute_texel(triangle: u32, texel: u32) -> vec4u {
     return textureLoad(attributes, data_texel(triangle * 5u + texel), 0);
 }
 
+// The corners' normals, and in w their tangents_01.
+fn load_normals(triangle: u32) -> vec4u {
+    return attribute_texel(triangle, 3u);
+}
+
+// The corners' colours, and in w their tangent_2.
+fn load_colors(triangle: u32) -> vec4u {
+    return attribute_texel(triangle, 4u);
+}
+
 fn load_attributes(triangle: u32) -> TriangleAttributes {
-    let normals = attribute_texel(triangle, 3u);
-    let colors = attribute_texel(triangle, 4u);
+    let normals = load_normals(triangle);
+    let colors = load_colors(triangle);
     return TriangleAttributes(
         bitcast<vec4f>(attribute_texel(triangle, 0u)),
         bitcast<vec4f>(attribute_texel(triangle, 1u)),
@@ -85,6 +95,9 @@ fn material_texel(material: u32, texel: u32) -> vec4u {
 }
 
 fn load_texture_slot(material: u32, texel: u32) -> TextureSlot {
+    if !scene_has_textures {
+        return TextureSlot();
+    }
     let u = material_texel(material, texel);
     let v = material_texel(material, texel + 1u);
     return TextureSlot(bitcast<vec3f>(u.xyz), u.w, bitcast<vec3f>(v.xyz), v.w);

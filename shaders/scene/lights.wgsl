@@ -100,7 +100,7 @@ fn light_sample_pdf(position: vec3f, sample: LightSample) -> f32 {
     if kind == LIGHT_TRIANGLE {
         let instance = lights[sample.light].instance;
         let triangle = lights[sample.light].triangle;
-        if is_sphere(load_triangle(triangle).flags) {
+        if scene_has_shapes && is_sphere(load_triangle(triangle).flags) {
             // Solid angle to area.
             let uv = light_sample_barycentrics(sample);
             let to_light = triangle_point(instance, triangle, uv) - position;
@@ -126,7 +126,7 @@ fn light_sample_pdf(position: vec3f, sample: LightSample) -> f32 {
 // light `light`.
 fn light_hit_pdf(light: u32, instance: u32, triangle: u32, position: vec3f, direction: vec3f, distance: f32) -> f32 {
     let flags = load_triangle(triangle).flags;
-    if is_sphere(flags) {
+    if scene_has_shapes && is_sphere(flags) {
         return lights[light].pmf * sphere_solid_angle_pdf(instance, triangle, position);
     }
     var cosine_times_area = abs(dot(triangle_normal(instance, triangle), direction)) * 0.5;

@@ -2,6 +2,7 @@
 // scenes that use an extension have (src/scene/flat/extensions.rs). Loaders read whole records; what a scene does not
 // use, its `scene_has_` overrides leave out.
 #include "scene/data.wgsl"
+#include "lib/bsdf/lobes.wgsl"
 
 struct MaterialExtensions {
     specular_color: vec3f,
@@ -58,12 +59,19 @@ fn extension_factors(material: u32, texel: u32) -> vec4f {
 }
 
 fn extension_slot(material: u32, index: u32) -> TextureSlot {
+    if !scene_has_textures {
+        return TextureSlot();
+    }
     let u = extension_texel(material, 7u + 2u * index);
     let v = extension_texel(material, 8u + 2u * index);
     return TextureSlot(bitcast<vec3f>(u.xyz), u.w, bitcast<vec3f>(v.xyz), v.w);
 }
 
 fn load_extensions(material: u32) -> MaterialExtensions {
+    if !(scene_has_specular || scene_has_transmission || scene_has_volumes || scene_has_unlit || scene_has_anisotropy
+        || scene_has_sheen || scene_has_clearcoat || scene_has_iridescence) {
+        return MaterialExtensions();
+    }
     let specular = extension_factors(material, 0u);
     let volume = extension_factors(material, 1u);
     let sheen = extension_factors(material, 2u);

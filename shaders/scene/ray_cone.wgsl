@@ -30,7 +30,7 @@ fn camera_footprint(camera: CameraView, position: vec3f) -> f32 {
 // unevenly is taken as scaled evenly.
 fn triangle_curvature(instance: u32, triangle: u32) -> f32 {
     let t = load_triangle(triangle);
-    let normals = load_attributes(triangle).normals;
+    let normals = load_normals(triangle);
     let n0 = decode_normal(normals.x);
     let n1 = decode_normal(normals.y);
     let n2 = decode_normal(normals.z);

@@ -71,7 +71,7 @@ fn triangle_normal(instance: u32, triangle: u32) -> vec3f {
 fn triangle_point(instance: u32, triangle: u32, uv: vec2f) -> vec3f {
     let t = load_triangle(triangle);
     var point = t.p0 + uv.x * (t.p1 - t.p0) + uv.y * (t.p2 - t.p0);
-    if is_sphere(t.flags) {
+    if scene_has_shapes && is_sphere(t.flags) {
         point = t.p0 + length(t.p1 - t.p0) * sphere_normal(uv);
     }
     if !scene_has_instances {
@@ -82,7 +82,7 @@ fn triangle_point(instance: u32, triangle: u32, uv: vec2f) -> vec3f {
 
 // Unit, out of the front of any primitive at a point of it.
 fn front_normal(instance: u32, triangle: u32, uv: vec2f) -> vec3f {
-    if !is_sphere(load_triangle(triangle).flags) {
+    if !scene_has_shapes || !is_sphere(load_triangle(triangle).flags) {
         return normalize(triangle_normal(instance, triangle));
     }
     if !scene_has_instances {
@@ -140,14 +140,14 @@ struct ShadingFrame {
 }
 
 fn shading_frame(triangle: u32, uv: vec2f) -> ShadingFrame {
-    if is_sphere(load_triangle(triangle).flags) {
+    if scene_has_shapes && is_sphere(load_triangle(triangle).flags) {
         return ShadingFrame(vec3f(0.0), vec3f(0.0), sphere_normal(uv), false);
     }
     let w = vec3f(1.0 - uv.x - uv.y, uv.x, uv.y);
-    let a = load_attributes(triangle);
-    let n0 = decode_normal(a.normals.x);
-    let n1 = decode_normal(a.normals.y);
-    let n2 = decode_normal(a.normals.z);
+    let normals = load_normals(triangle);
+    let n0 = decode_normal(normals.x);
+    let n1 = decode_normal(normals.y);
+    let n2 = decode_normal(normals.z);
     let sum = w.x * n0 + w.y * n1 + w.z * n2;
     let t = load_triangle(triangle);
     let face = cross(t.p1 - t.p0, t.p2 - t.p0);
@@ -155,13 +155,14 @@ fn shading_frame(triangle: u32, uv: vec2f) -> ShadingFrame {
     if !(scene_has_textures || scene_has_anisotropy) || (t.flags & TRIANGLE_TANGENTS) == 0u {
         return ShadingFrame(vec3f(0.0), vec3f(0.0), n, false);
     }
-    let t0 = corner_tangent(n0, a.tangents_01 & 0xffffu);
-    let t1 = corner_tangent(n1, a.tangents_01 >> 16u);
-    let t2 = corner_tangent(n2, a.tangent_2 & 0xffffu);
+    let tangent_2 = load_colors(triangle).w;
+    let t0 = corner_tangent(n0, normals.w & 0xffffu);
+    let t1 = corner_tangent(n1, normals.w >> 16u);
+    let t2 = corner_tangent(n2, tangent_2 & 0xffffu);
     return ShadingFrame(w.x * t0 + w.y * t1 + w.z * t2,
-        w.x * bitangent_sign(a.tangent_2, 0u) * cross(n0, t0)
-            + w.y * bitangent_sign(a.tangent_2, 1u) * cross(n1, t1)
-            + w.z * bitangent_sign(a.tangent_2, 2u) * cross(n2, t2),
+        w.x * bitangent_sign(tangent_2, 0u) * cross(n0, t0)
+            + w.y * bitangent_sign(tangent_2, 1u) * cross(n1, t1)
+            + w.z * bitangent_sign(tangent_2, 2u) * cross(n2, t2),
         n, true);
 }
 

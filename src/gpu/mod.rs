@@ -11,6 +11,7 @@ pub mod shader;
 pub mod binding_kind;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod shader_source;
+pub mod specialize;
 
 use crate::error::{Error, Result};
 use crate::pace::{Pace, SLICE_BYTES};

@@ -3,6 +3,7 @@
 pub use super::binding_kind::BindingKind;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::gpu::specialize::specialize;
 
 /// One resource a pass reaches.
 #[derive(Debug, Clone, Copy)]
@@ -180,15 +181,19 @@ impl Shader {
             .collect()
     }
 
+    /// `source` (the shader's own, or an edited one) as a scene that has `features` needs it: with values in place of
+    /// `override` constants, and without the code that these switch off.
+    pub fn specialized(&self, source: &str, features: SceneFeatures) -> String {
+        specialize(source, &|name| self.overrides.contains(&name).then(|| features.has(name)))
+    }
+
     /// The compute pipeline of this pass from `source` (its own, or an edited one with the same bindings), for scenes
     /// that have `features`.
     pub fn compute_pipeline(&self, device: &wgpu::Device, source: &str, features: SceneFeatures) -> Pipeline {
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(self.id),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
+            source: wgpu::ShaderSource::Wgsl(self.specialized(source, features).into()),
         });
-        let constants: Vec<(&str, f64)> =
-            self.overrides.iter().map(|name| (*name, f64::from(u8::from(features.has(name))))).collect();
         let groups = self.layouts(device, wgpu::ShaderStages::COMPUTE);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(self.id),
@@ -200,7 +205,7 @@ impl Shader {
             layout: Some(&layout),
             module: &module,
             entry_point: Some("main"),
-            compilation_options: wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() },
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
             cache: None,
         });
         Pipeline { pipeline, groups }

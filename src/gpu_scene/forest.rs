@@ -36,7 +36,13 @@ impl Forest {
             }
             let tree = collapse.wide;
             limit("the BVH of a mesh", tree.stack, wide::MAX_STACK)?;
-            forest.nodes.extend(tree.nodes);
+            // Most scenes have one large mesh, first: its nodes are not copied.
+            if forest.nodes.is_empty() {
+                forest.nodes = tree.nodes;
+            } else {
+                forest.nodes.extend(tree.nodes);
+            }
+            pace.breathe().await;
         }
         if scene.has_top_level() {
             forest.top_level = forest.nodes.len() as u32;

@@ -7,11 +7,12 @@
 use super::{Deformers, FlatEnvironment, FlatScene, SceneStats, TextureArray, validate};
 use crate::error::{Error, Result};
 use crate::pace::{Pace, SLICE_BYTES};
-use crate::scene::rig::bytes as rig_bytes;
+use crate::scene::rig::bytes::{self as rig_bytes, Section};
 use crate::scene::{Camera, Projection, Rig};
 use bytemuck::Pod;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 const _: () = assert!(cfg!(target_endian = "little"), "arrays are copied as they lie in memory");
 
@@ -119,28 +120,28 @@ impl FlatScene {
     }
 
     /// As `sections`, to be filled.
-    fn sections_mut(&mut self) -> Vec<&mut [u8]> {
-        let mut sections: Vec<&mut [u8]> = vec![
-            bytemuck::cast_slice_mut(&mut self.nodes),
-            bytemuck::cast_slice_mut(&mut self.triangles),
-            bytemuck::cast_slice_mut(&mut self.attributes),
-            bytemuck::cast_slice_mut(&mut self.meshes),
-            bytemuck::cast_slice_mut(&mut self.instances),
-            bytemuck::cast_slice_mut(&mut self.materials),
-            bytemuck::cast_slice_mut(&mut self.material_extensions),
-            bytemuck::cast_slice_mut(&mut self.lights),
+    fn sections_mut(&mut self) -> Vec<&mut dyn Section> {
+        let mut sections: Vec<&mut dyn Section> = vec![
+            &mut self.nodes,
+            &mut self.triangles,
+            &mut self.attributes,
+            &mut self.meshes,
+            &mut self.instances,
+            &mut self.materials,
+            &mut self.material_extensions,
+            &mut self.lights,
         ];
-        sections.extend(self.textures.iter_mut().map(|array| &mut array.texels[..]));
+        sections.extend(self.textures.iter_mut().map(|array| &mut array.texels as &mut dyn Section));
         if let Some(environment) = &mut self.environment {
-            sections.push(bytemuck::cast_slice_mut(&mut environment.radiance));
-            sections.push(bytemuck::cast_slice_mut(&mut environment.alias));
+            sections.push(&mut environment.radiance);
+            sections.push(&mut environment.alias);
         }
         sections.extend(self.rig.arrays_mut());
         let deformers = &mut self.deformers;
-        sections.push(bytemuck::cast_slice_mut(&mut deformers.list));
-        sections.push(bytemuck::cast_slice_mut(&mut deformers.vertices));
-        sections.push(bytemuck::cast_slice_mut(&mut deformers.displacements));
-        sections.push(bytemuck::cast_slice_mut(&mut deformers.corners));
+        sections.push(&mut deformers.list);
+        sections.push(&mut deformers.vertices);
+        sections.push(&mut deformers.displacements);
+        sections.push(&mut deformers.corners);
         sections
     }
 
@@ -150,11 +151,9 @@ impl FlatScene {
     /// # Errors
     /// [`Error::BadFile`] with the place of the first fault.
     pub fn from_bytes(bytes: &[u8]) -> Result<FlatScene> {
-        let (mut scene, mut position) = Self::hollow(bytes, bytes.len())?;
-        for section in scene.sections_mut() {
-            position = position.next_multiple_of(ALIGNMENT);
-            section.copy_from_slice(&bytes[position..position + section.len()]);
-            position += section.len();
+        let (mut scene, places) = Self::hollow(bytes, bytes.len())?;
+        for (section, place) in scene.sections_mut().into_iter().zip(places) {
+            section.lengthen(place.len(), usize::MAX).copy_from_slice(&bytes[place]);
         }
         validate::validate(&scene).map_err(|(place, what)| bad(place, what))?;
         Ok(scene)
@@ -171,22 +170,22 @@ impl FlatScene {
         let header_length = head.get(8..12).map_or(0, |word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
         head.resize(length.min(PREFIX + header_length as usize), 0);
         read(0, &mut head);
-        let (mut scene, mut position) = Self::hollow(&head, length)?;
-        for section in scene.sections_mut() {
-            position = position.next_multiple_of(ALIGNMENT);
-            for part in section.chunks_mut(SLICE_BYTES) {
-                read(position, part);
-                position += part.len();
+        let (mut scene, places) = Self::hollow(&head, length)?;
+        for (section, mut place) in scene.sections_mut().into_iter().zip(places) {
+            while !place.is_empty() {
+                let part = section.lengthen(place.len(), SLICE_BYTES);
+                read(place.start, part);
+                place.start += part.len();
                 pace.breathe().await;
             }
         }
         Ok(scene)
     }
 
-    /// The scene that `length` bytes, of which `head` are at least the header, describe, its arrays full of zeros; and
-    /// where the first of them begins.
-    fn hollow(head: &[u8], length: usize) -> Result<(FlatScene, usize)> {
-        let mut reader = Reader { head, length, position: 0 };
+    /// The scene that `length` bytes, of which `head` are at least the header, describe, its arrays still empty; and where
+    /// each of them lies.
+    fn hollow(head: &[u8], length: usize) -> Result<(FlatScene, Vec<Range<usize>>)> {
+        let mut reader = Reader { head, length, position: 0, places: Vec::new() };
         let prefix = reader.take(PREFIX, "prefix")?;
         let word = |i: usize| {
             let mut word = [0; 4];
@@ -200,7 +199,6 @@ impl FlatScene {
             return Err(bad("prefix", format!("version {} instead of {VERSION}", u32::from_le_bytes(word(1)))));
         }
         let header = reader.take(u32::from_le_bytes(word(2)) as usize, "header")?;
-        let first = reader.position;
         let header: Header = serde_json::from_slice(header).map_err(|e| bad("header", e.to_string()))?;
         let Sections {
             nodes,
@@ -253,7 +251,7 @@ impl FlatScene {
         if reader.position != length {
             return Err(bad("end", format!("{} bytes too many", length - reader.position)));
         }
-        Ok((scene, first))
+        Ok((scene, reader.places))
     }
 }
 
@@ -266,6 +264,8 @@ struct Reader<'a> {
     head: &'a [u8],
     length: usize,
     position: usize,
+    /// Where the arrays lie that were met.
+    places: Vec<Range<usize>>,
 }
 
 impl<'a> Reader<'a> {
@@ -286,13 +286,14 @@ impl<'a> Reader<'a> {
         self.head.get(start..self.position).ok_or_else(|| bad(place, "it is not there"))
     }
 
-    /// Zeros, as many as the bytes are there for.
+    /// Room for an array, if its bytes are there; it is filled later.
     fn array<T: Pod>(&mut self, count: usize, place: &str) -> Result<Vec<T>> {
         let padding = self.position.next_multiple_of(ALIGNMENT) - self.position;
         self.skip(padding, place)?;
         let length = count.checked_mul(size_of::<T>()).ok_or_else(|| bad(place, "absurd length"))?;
         self.skip(length, place)?;
-        Ok(bytemuck::zeroed_vec(count))
+        self.places.push(self.position - length..self.position);
+        Ok(Vec::with_capacity(count))
     }
 }
 

@@ -25,8 +25,10 @@ pub(super) struct Document<'a> {
     pub scene: Option<usize>,
     /// Index of the chosen variant, if one was chosen.
     pub variant: Option<usize>,
-    /// What decodes compressed data; none where the file does not say that it has any.
+    /// What decodes pictures and compressed data.
     pub decoders: Option<&'a dyn Decoders>,
+    /// Whether the file names one of [`DECODED_EXTENSIONS`].
+    pub uses_decoded_extensions: bool,
     /// Channels of animations that target no node (KHR_animation_pointer), and were left out.
     pub pointer_channels: usize,
 }
@@ -114,8 +116,9 @@ pub(super) fn parse<'a>(file: &'a str, bytes: &'a [u8], options: &Options<'a>) -
         // Lines and columns of that text are not the file's.
         serde_json::from_slice(&completed).map_err(|error| Error::bad_file(file, "JSON", json_fault(&error)))?
     };
-    let decoders = options.decoders.filter(|_| contents.needs_decoders);
-    Ok(Document { file, root, binary, contents, scene: options.scene, variant, decoders, pointer_channels })
+    let Options { scene, decoders, .. } = *options;
+    let uses_decoded_extensions = header.uses_decoded_extensions();
+    Ok(Document { file, root, binary, contents, scene, variant, decoders, uses_decoded_extensions, pointer_channels })
 }
 
 /// Gives each scene its `nodes`, which the specification lets it leave out, but the JSON crate does not; and takes away
@@ -218,6 +221,8 @@ struct Header {
     extensions: Extensions,
     #[serde(default)]
     animations: Vec<AnimationHeader>,
+    #[serde(default)]
+    images: Vec<serde::de::IgnoredAny>,
 }
 
 /// One of `animations` of [`Header`].
@@ -276,7 +281,6 @@ struct Variant {
 impl Header {
     /// What can be chosen. Text is made fit for a line; a variant is asked for by that.
     fn contents(&self) -> Contents {
-        let used = self.extensions_used.iter().chain(&self.extensions_required);
         let name = |(index, scene): (usize, &SceneHeader)| {
             scene.name.as_deref().map_or_else(|| format!("scene {index}"), tidy)
         };
@@ -284,8 +288,13 @@ impl Header {
             scenes: self.scenes.iter().enumerate().map(name).collect(),
             scene: self.scene,
             variants: self.extensions.variants.variants.iter().map(|variant| tidy(&variant.name)).collect(),
-            needs_decoders: used.into_iter().any(|name| DECODED_EXTENSIONS.contains(&name.as_str())),
+            needs_decoders: !self.images.is_empty() || self.uses_decoded_extensions(),
         }
+    }
+
+    fn uses_decoded_extensions(&self) -> bool {
+        let mut used = self.extensions_used.iter().chain(&self.extensions_required);
+        used.any(|name| DECODED_EXTENSIONS.contains(&name.as_str()))
     }
 }
 

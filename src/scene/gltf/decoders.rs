@@ -19,7 +19,7 @@ pub(super) const BASISU: &str = "KHR_texture_basisu";
 /// `EXT_texture_webp`.
 pub(super) const WEBP: &str = "EXT_texture_webp";
 
-/// Decodes geometry and pictures. See the crate `restir-decoders` for each.
+/// Decodes compressed geometry, and pictures. See the crate `restir-decoders` for each.
 pub trait Decoders {
     /// A Draco mesh of at most `max_bytes`.
     ///
@@ -40,7 +40,7 @@ pub trait Decoders {
         stride: u32,
     ) -> std::result::Result<Vec<u8>, Fault>;
 
-    /// A WebP or KTX2 picture.
+    /// A PNG, JPEG, WebP or KTX2 picture.
     ///
     /// # Errors
     /// [`Fault`]
@@ -75,14 +75,27 @@ impl Decoders for Linked {
 }
 
 impl Document<'_> {
-    /// What `decode` makes of its decoders, with faults placed in this file.
+    /// What `decode` makes of the decoders, of data whose extension the file has to name; faults are placed in this file.
     pub fn decode<T>(
         &self,
         place: &str,
         decode: impl FnOnce(&dyn Decoders) -> std::result::Result<T, Fault>,
     ) -> Result<T> {
-        let Some(decoders) = self.decoders else {
+        if !self.uses_decoded_extensions || self.decoders.is_none() {
             let what = format!("{place}: this kind of data without its extension among extensionsUsed");
+            return Err(Error::Unsupported { file: self.file.into(), what });
+        }
+        self.decode_core(place, decode)
+    }
+
+    /// The same of data that the core specification knows.
+    pub fn decode_core<T>(
+        &self,
+        place: &str,
+        decode: impl FnOnce(&dyn Decoders) -> std::result::Result<T, Fault>,
+    ) -> Result<T> {
+        let Some(decoders) = self.decoders else {
+            let what = format!("{place}: nothing was given that decodes it");
             return Err(Error::Unsupported { file: self.file.into(), what });
         };
         decode(decoders).map_err(|fault| match fault {

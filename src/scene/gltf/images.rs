@@ -1,14 +1,12 @@
-//! Images, decoded to RGBA8: PNG and JPEG, and by their extensions WebP and KTX2.
+//! Images as RGBA8: PNG and JPEG, and by their extensions WebP and KTX2. Who decodes them: [`super::Decoders`].
 
 use super::buffers::Buffers;
 use super::container::Document;
 use super::decoders::{BASISU, Limits as PictureLimits, WEBP};
-use super::{MAX_IMAGE_BYTES, MAX_IMAGE_SIDE, Resolve, tidy, uri};
-use crate::error::{Error, Result};
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use super::{MAX_IMAGE_BYTES, MAX_IMAGE_SIDE, Resolve, uri};
+use crate::error::Result;
 use std::borrow::Cow;
 use std::collections::HashMap;
-use std::io::Cursor;
 use std::sync::Arc;
 
 /// Most bytes a decoder may allocate for one image.
@@ -73,48 +71,16 @@ impl Images {
         Ok(decoded)
     }
 
-    /// Decodes `file`, whose format is told by its first bytes. The header's size is checked before anything is
-    /// allocated for it.
+    /// Decodes `file`, whose format is told by its first bytes. The size is checked before anything is allocated for it.
     fn decode(&mut self, document: &Document, file: &[u8], place: &str) -> Result<Image> {
-        if file.starts_with(b"\xabKTX 20\xbb") || file.get(8..12) == Some(b"WEBP") {
-            return self.decode_picture(document, file, place);
-        }
-        let broken = |error: image::ImageError| document.bad(place, tidy(&error.to_string()));
-        let format = match image::guess_format(file) {
-            Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) => format,
-            Ok(other) => {
-                let what = format!("image format {other:?} ({place})");
-                return Err(Error::Unsupported { file: document.file.into(), what });
-            }
-            Err(_) => return Err(document.bad(place, "it is neither PNG, JPEG, WebP nor KTX2")),
-        };
-        let mut limits = Limits::default();
-        limits.max_image_width = Some(MAX_IMAGE_SIDE);
-        limits.max_image_height = Some(MAX_IMAGE_SIDE);
-        limits.max_alloc = Some(MAX_DECODER_BYTES);
-        let mut reader = ImageReader::with_format(Cursor::new(file), format);
-        reader.limits(limits);
-        let decoder = reader.into_decoder().map_err(broken)?;
-        let (width, height) = decoder.dimensions();
-        if width == 0 || height == 0 || width > MAX_IMAGE_SIDE || height > MAX_IMAGE_SIDE {
-            return Err(document.bad(place, format!("{width} x {height} texels; at most {MAX_IMAGE_SIDE} a side")));
-        }
-        if decoder.total_bytes() > MAX_DECODER_BYTES {
-            return Err(
-                document.bad(place, format!("{width} x {height} texels take more than {MAX_DECODER_BYTES} bytes"))
-            );
-        }
-        self.bytes += u64::from(width) * u64::from(height) * 4;
-        document.within("its decoded images", self.bytes, MAX_IMAGE_BYTES, "bytes")?;
-        let pixels = DynamicImage::from_decoder(decoder).map_err(broken)?.into_rgba8().into_raw();
-        Ok(Image { width, height, pixels: Arc::new(pixels) })
-    }
-
-    /// Decodes a WebP or KTX2 file.
-    fn decode_picture(&mut self, document: &Document, file: &[u8], place: &str) -> Result<Image> {
         let left = (MAX_IMAGE_BYTES - self.bytes.min(MAX_IMAGE_BYTES)).min(MAX_DECODER_BYTES);
         let limits = PictureLimits { side: MAX_IMAGE_SIDE, bytes: left };
-        let picture = document.decode(place, |decoders| decoders.picture(file, limits))?;
+        let by_extension = file.starts_with(b"\xabKTX 20\xbb") || file.get(8..12) == Some(b"WEBP");
+        let picture = if by_extension {
+            document.decode(place, |decoders| decoders.picture(file, limits))?
+        } else {
+            document.decode_core(place, |decoders| decoders.picture(file, limits))?
+        };
         self.bytes += picture.pixels.len() as u64;
         Ok(Image { width: picture.width, height: picture.height, pixels: Arc::new(picture.pixels) })
     }

@@ -86,7 +86,7 @@ pub struct Options<'a> {
     pub scene: Option<usize>,
     /// Name of the variant (`KHR_materials_variants`) whose materials are used; as [`Contents::variants`] has it.
     pub variant: Option<&'a str>,
-    /// Decodes what [`DECODED_EXTENSIONS`] compress.
+    /// Decodes images, and what [`DECODED_EXTENSIONS`] compress.
     pub decoders: Option<&'a dyn Decoders>,
 }
 
@@ -110,7 +110,7 @@ pub struct Contents {
     pub scene: usize,
     /// Names of the material variants.
     pub variants: Vec<String>,
-    /// Whether it uses one of [`DECODED_EXTENSIONS`].
+    /// Whether it uses one of [`DECODED_EXTENSIONS`], or has images.
     pub needs_decoders: bool,
 }
 

@@ -17,6 +17,22 @@ pub(in crate::scene) trait TakeArray {
     fn take_array<T: Pod>(&mut self, count: usize, place: &str) -> Result<Vec<T>>;
 }
 
+/// An array that is filled from its start. Memory that is touched for the first time takes longer than the copy, so that it
+/// is not filled with zeros at once.
+pub(in crate::scene) trait Section {
+    /// Adds zeros for `wanted` bytes, or for a part of about `limit` bytes of them; that part, to be filled.
+    fn lengthen(&mut self, wanted: usize, limit: usize) -> &mut [u8];
+}
+
+impl<T: Pod> Section for Vec<T> {
+    fn lengthen(&mut self, wanted: usize, limit: usize) -> &mut [u8] {
+        let before = self.len();
+        let count = (wanted / size_of::<T>()).min((limit / size_of::<T>()).max(1));
+        self.resize(before + count, T::zeroed());
+        bytemuck::cast_slice_mut(&mut self[before..])
+    }
+}
+
 impl Rig {
     /// What [`Rig::from_arrays`] needs besides the arrays.
     pub(in crate::scene) fn header(&self) -> Header {
@@ -55,19 +71,18 @@ impl Rig {
     }
 
     /// The same, to be filled.
-    pub(in crate::scene) fn arrays_mut(&mut self) -> [&mut [u8]; 10] {
-        use bytemuck::cast_slice_mut;
+    pub(in crate::scene) fn arrays_mut(&mut self) -> [&mut dyn Section; 10] {
         [
-            cast_slice_mut(&mut self.nodes),
-            cast_slice_mut(&mut self.channels),
-            cast_slice_mut(&mut self.keys),
-            cast_slice_mut(&mut self.spins),
-            cast_slice_mut(&mut self.skins),
-            cast_slice_mut(&mut self.joints),
-            cast_slice_mut(&mut self.weights),
-            cast_slice_mut(&mut self.instances),
-            cast_slice_mut(&mut self.lights),
-            cast_slice_mut(&mut self.cameras),
+            &mut self.nodes,
+            &mut self.channels,
+            &mut self.keys,
+            &mut self.spins,
+            &mut self.skins,
+            &mut self.joints,
+            &mut self.weights,
+            &mut self.instances,
+            &mut self.lights,
+            &mut self.cameras,
         ]
     }
 
