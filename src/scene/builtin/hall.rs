@@ -16,6 +16,9 @@ const LAMPS: [u32; 2] = [8, 5];
 /// Side of a lamp in metres.
 const LAMP_SIZE: f32 = 2.0;
 const COLORS: usize = 6;
+/// Where the camera stands, and how near to it no object is, which would hide the others.
+const EYE: Vec3 = Vec3::new(-36.0, 9.0, -21.0);
+const CLEARANCE: f32 = 9.0;
 const FEWEST: u32 = 10_000;
 const MOST: u32 = 8_000_000;
 const SEED: u64 = 0x6861_6c6c;
@@ -32,12 +35,7 @@ pub(super) fn hall(count: &str) -> Result<Scene> {
             matte("wall", Vec3::new(0.72, 0.7, 0.66)),
             Material { emissive: Vec3::splat(30.0), ..matte("lamp", Vec3::ZERO) },
         ],
-        cameras: vec![Camera::look_at(
-            "hall",
-            Vec3::new(-36.0, 9.0, -21.0),
-            Vec3::new(10.0, 6.0, 8.0),
-            60f32.to_radians(),
-        )],
+        cameras: vec![Camera::look_at("hall", EYE, Vec3::new(10.0, 6.0, 8.0), 60f32.to_radians())],
         ..Scene::default()
     };
     for i in 0..COLORS {
@@ -77,7 +75,10 @@ fn object(index: usize, triangles: u32) -> Mesh {
     let radius = 0.6 + 1.8 * random.unit() * random.unit();
     // More of them near the floor.
     let height = radius + (18.0 - 2.0 * radius) * random.unit() * random.unit();
-    let center = Vec3::new(random.range(-37.0, 37.0), height, random.range(-22.0, 22.0));
+    let mut center = Vec3::new(random.range(-37.0, 37.0), height, random.range(-22.0, 22.0));
+    if center.distance(EYE) < CLEARANCE {
+        center.x = -center.x;
+    }
     let frequency = random.in_box(Vec3::splat(2.0), Vec3::splat(8.0));
     let phase = random.in_box(Vec3::ZERO, Vec3::splat(9.0));
     let amplitude = random.range(0.05, 0.2);
