@@ -21,9 +21,9 @@ struct Case {
     transform: Mat4,
     /// A ball inside of the mesh, in its own space.
     radius: f32,
-    /// Whether hardly anything outside may be hit from outside: plane faces, exactly. Not nothing: the triangle test lets 16
-    /// units of roundoff pass, so a ray that grazes its face and leaves it within 1e-6 of the edge beside, relative to the
-    /// face, may hit the face there; 12 of 111,112 do, with boxes wide enough to let them come to the test.
+    /// Whether hardly anything outside may be hit from outside: plane faces, exactly. Not nothing: the triangle test lets
+    /// rounding pass, so a ray that grazes its face and leaves it very near the edge beside may hit the face there; about one
+    /// in ten thousand does.
     is_convex: bool,
 }
 

@@ -69,30 +69,24 @@ fn walk(
     }
 }
 
-/// The Plücker product of a ray from the origin and the edge from a to b: exactly the negative for the edge reversed.
-fn edge_product(a: Vec3, b: Vec3, direction: Vec3) -> f32 {
-    (a - b).cross(a + b).dot(direction)
-}
-
-/// Edge tests by Plücker products (Davidovic et al. 2012), rounding let pass: (t, u, v) if 0 < t < `t_max`.
+/// Möller and Trumbore 1997, rounding let pass as in `shaders/scene/bvh.wgsl`: (t, u, v) if 0 < t < `t_max`.
 pub fn intersect_triangle(triangle: &Triangle, origin: Vec3, direction: Vec3, t_max: f32) -> Option<(f32, f32, f32)> {
-    let (e1, e2) = (triangle.p1 - triangle.p0, triangle.p2 - triangle.p0);
     if triangle.shape() != Shape::Triangles {
         return intersect_shape(triangle, origin, direction, t_max);
     }
-    let [p0, p1, p2] = [triangle.p0, triangle.p1, triangle.p2].map(|p| p - origin);
-    let [w0, w1, w2] = [(p2, p1), (p0, p2), (p1, p0)].map(|(a, b)| edge_product(a, b, direction));
-    let sum = w0 + w1 + w2;
-    let largest = |v: Vec3| v.abs().max_element();
-    let edge = largest(e1).max(largest(e2));
-    let rounding = 1e-6 * largest(direction) * edge * (largest(p0) + edge);
-    let is_front = sum > 0.0 && w0.min(w1).min(w2) >= -rounding;
-    let is_double_sided = triangle.flags & TRIANGLE_DOUBLE_SIDED != 0;
-    let is_back = sum < 0.0 && w0.max(w1).max(w2) <= rounding && is_double_sided;
-    let normal = e1.cross(e2);
-    let speed = direction.dot(normal).abs();
-    let t = p0.dot(normal) / if is_front { -speed } else { speed };
-    let hits = (is_front || is_back) && t > 0.0 && t < t_max;
+    let (e1, e2) = (triangle.p1 - triangle.p0, triangle.p2 - triangle.p0);
+    let s = origin - triangle.p0;
+    let (p, q) = (direction.cross(e2), s.cross(e1));
+    let determinant = e1.dot(p);
+    let taxicab = |v: Vec3| v.abs().element_sum();
+    let edges = taxicab(e1) + taxicab(e2);
+    let rounding = 6e-8 * taxicab(direction) * edges * (taxicab(s) + edges);
+    let side = determinant.signum();
+    let (w1, w2, sum) = (side * s.dot(p), side * direction.dot(q), determinant.abs());
+    let is_outside = w1.min(w2).min(sum - w1 - w2) < -rounding;
+    let is_culled = side < 0.0 && triangle.flags & TRIANGLE_DOUBLE_SIDED == 0;
+    let t = e2.dot(q) / determinant;
+    let hits = !is_outside && !is_culled && sum > 0.0 && t > 0.0 && t < t_max;
     // Only then: `clamp` does not bear the NaN of a triangle without area.
     hits.then(|| {
         let u = (w1 / sum).clamp(0.0, 1.0);
