@@ -35,8 +35,8 @@ use glam::{Mat4, Vec2, Vec3, Vec4};
 /// Farther from the origin than this, in metres, products of three lengths no longer fit in f32: such positions are not
 /// used.
 const MAX_COORDINATE: f32 = 1e9;
-/// Most triangles after instancing: 2 GiB of them, or 512 MiB where addresses are short.
-pub const MAX_TRIANGLES: u64 = if cfg!(target_pointer_width = "32") { 1 << 22 } else { 1 << 24 };
+/// Most triangles after instancing: 2 GiB of them, or 640 MiB where addresses are short.
+pub const MAX_TRIANGLES: u64 = if cfg!(target_pointer_width = "32") { 5 << 20 } else { 1 << 24 };
 
 /// A scene as a person thinks of it. Lengths in metres, Y up, right-handed; colours linear Rec. 709.
 #[derive(Debug, Clone, Default)]
