@@ -485,6 +485,8 @@ fn bench_rays_traces_a_file() {
     assert_eq!(words[2..], [100f32.to_bits(), u32::MAX, 0.1f32.to_bits(), u32::MAX]);
 
     let short = folder.write("short.bin", &rays[..31]);
+    let endless = restir(&["bench", "rays", "builtin:cornell", "--rays", "/dev/zero"]);
+    assert_eq!(endless.status.code(), Some(1), "what never ends is not read");
     let output = restir(&["bench", "rays", "builtin:cornell", "--rays", &short]);
     assert_eq!(output.status.code(), Some(1));
     assert!(stderr(&output).contains("31 bytes"), "{}", stderr(&output));

@@ -636,6 +636,10 @@ fn odd_and_broken_obj() {
     }
     // Binary data under the name.
     assert!(obj::load_bytes("test.obj", &[255, 254, 0, 1, 10], &mut nothing).is_err());
+    // A byte order mark is no part of the first line.
+    let triangle = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n";
+    let [with, without] = ["\u{feff}", ""].map(|mark| load(&format!("{mark}{triangle}"), None).unwrap());
+    assert_eq!(with.meshes[0].positions, without.meshes[0].positions);
     // Textures stay in the folder.
     let outside = load(OBJ, Some("newmtl painted\nmap_Kd ../../etc/passwd\n"));
     assert_refused(outside, "BAD_FILE", &["leaves the folder"]);

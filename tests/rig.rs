@@ -11,6 +11,7 @@ use restir::{Error, FlatScene, Result};
 use serde_json::json;
 use std::time::{Duration, Instant};
 use support::animated::{DURATION, HALF_WIDTH, animated, node};
+use support::extensions::quad;
 use support::gltf_writer::{U16, Writer};
 
 fn load(bytes: &[u8]) -> Result<Scene> {
@@ -34,6 +35,18 @@ fn shape(scene: &Scene, index: usize, time: f64) -> Vec<Deformed> {
     let to_world = pose.instance(placement);
     out.iter_mut().for_each(|vertex| vertex.position = to_world.transform_point3(vertex.position));
     out
+}
+
+#[test]
+fn a_lamp_that_grows_from_nothing_is_known_at_rest() {
+    let mut scene = restir::scene::builtin::make("motion").unwrap();
+    let lamp = *scene.rig.instances.last().unwrap();
+    scene.rig.nodes[lamp.node as usize].scale = Vec3::ZERO;
+    scene.instances[lamp.instance as usize].transform = Mat4::from_scale(Vec3::ZERO);
+    let flat = FlatScene::build(&scene, &mut |_, _| ()).unwrap();
+    assert!(flat.lights.iter().all(|light| light.pmf > 0.0), "a light that is never drawn");
+    assert!(flat.bounds[1].max_element() < 10.0, "{:?}: what has no place is in the scene's box", flat.bounds);
+    assert!(flat.stats.bvh_depth < 24 && flat.stats.bvh_cost < 1000.0, "{:?}", flat.stats);
 }
 
 #[test]
@@ -175,6 +188,10 @@ fn broken_animations_are_refused() {
 
 #[test]
 fn broken_skins_and_targets_are_refused() {
+    // In a file without anything that moves, too.
+    let mut lone = quad(json!({}));
+    lone.json["nodes"][0]["skin"] = json!(3);
+    assert!(matches!(load(&lone.glb()), Err(Error::BadFile { .. })), "a skin that does not exist");
     let skin = |key: &'static str, value: serde_json::Value| {
         move |writer: &mut Writer| writer.json["skins"][0][key] = value.clone()
     };

@@ -146,7 +146,7 @@ fn no_ray_leaves_a_closed_mesh() {
     assert!(faults.is_empty(), "{faults:?}");
 }
 
-/// The count can fail: a ball without one triangle leaks.
+/// The count can fail: a ball with a hole at its pole leaks.
 #[test]
 fn a_hole_is_noticed() {
     let mut case = cases().remove(1);

@@ -22,6 +22,11 @@ pub struct Converted {
     pub warnings: Vec<String>,
 }
 
+/// What follows a byte order mark, which some editors write; else the first line would be no line of OBJ.
+fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
+}
+
 /// Converts an OBJ file; `resolve` is asked for its material libraries.
 ///
 /// # Errors
@@ -33,14 +38,14 @@ pub fn to_glb(bytes: &[u8], resolve: Resolve) -> Result<Converted> {
     if bytes.contains(&0) {
         return Err(broken("OBJ: it is not text"));
     }
-    let text = String::from_utf8_lossy(bytes);
+    let text = String::from_utf8_lossy(without_mark(bytes));
     check_indices(&text)?;
     let library = |path: &Path| {
         let name = path.to_string_lossy().replace('\\', "/");
         let bytes = (resolve.borrow_mut())(&name);
         let loaded = bytes
             .ok_or(LoadError::OpenFileFailed)
-            .and_then(|mtl| tobj::load_mtl_buf(&mut Cursor::new(whole_colours(&mtl))));
+            .and_then(|mtl| tobj::load_mtl_buf(&mut Cursor::new(whole_colours(without_mark(&mtl)))));
         if let Err(error) = &loaded {
             let why = if *error == LoadError::OpenFileFailed { "it was not found".into() } else { error.to_string() };
             warnings.borrow_mut().push(format!("material library {}: {why}; its materials are grey", tidy(&name)));

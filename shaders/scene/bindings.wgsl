@@ -36,7 +36,7 @@ struct Frame {
     previous_environment_turn: vec2f, // the same in the previous frame
     sun_light: u32, // index of the sun in `lights`, or NONE
     texture_levels: u32, // TEXTURE_LEVELS_CONE or TEXTURE_LEVELS_FINEST
-    previous_top_level: u32, // the same of the previous frame
+    previous_top_level: u32, // root of the previous frame's top level
     instance_count: u32, // the twins of instances, as they were in the previous frame, come after as many
 }
 

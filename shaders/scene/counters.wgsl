@@ -1,4 +1,4 @@
-// Counters that techniques add to; cleared at the start of each frame.
+// Counters that passes add to: rays are cleared every frame, what was left out when the film starts again.
 #include "scene/bvh.wgsl"
 
 struct Counters {

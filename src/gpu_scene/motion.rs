@@ -156,8 +156,11 @@ impl Motion {
                 body_of(mesh).and_then(|i| stage.bodies.get(i)).map_or(still, Body::bounds)
             };
             let each = scene.instances.iter().zip(&stage.transforms);
-            let boxes: Vec<[Vec3; 2]> =
-                each.map(|(instance, &to_world)| levels::transformed_box(to_world, bounds(instance.mesh))).collect();
+            let boxes: Vec<[Vec3; 2]> = each
+                .map(|(instance, &to_world)| {
+                    levels::transformed_box(to_world, bounds(instance.mesh)).unwrap_or(levels::NOWHERE)
+                })
+                .collect();
             let now = levels::top_level(&boxes, 0);
             let before = if stage.has_moved() && !self.top_level.is_empty() { &self.top_level } else { &now };
             write_nodes(gpu, device, device.top_level, &wide::collapse(&now, 0, device.top_level, 0).nodes);

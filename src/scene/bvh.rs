@@ -19,7 +19,8 @@ pub const MAX_LEAF: u32 = 4;
 /// How much work goes into a tree. Rates of rays and times of building are in `docs/performance.md`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Preset {
-    /// Half the time to build, for rays a twentieth slower: for the page, and for meshes rebuilt while they move.
+    /// Five eighths to three quarters of the time to build, for rays a twentieth slower: for the page, and for meshes rebuilt
+    /// while they move.
     Quick,
     /// For everything else.
     Thorough,

@@ -8,7 +8,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// [`Error::Io`] where it cannot be read or is no regular file, [`Error::Limit`] where it is larger.
-pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
+pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
     let io_error = |source| Error::Io { path: path.display().to_string(), source };
     let too_large = |wanted| Error::Limit { what: path.display().to_string(), wanted, had: limit, unit: "bytes" };
     // Devices and pipes may never end.

@@ -63,27 +63,29 @@ impl Scene {
     }
 
     fn has_light(&self) -> bool {
-        let emits = |instance: &super::Instance| {
+        let emits = |(index, instance): (usize, &super::Instance)| {
             let Some(mesh) = self.meshes.get(instance.mesh as usize) else { return false };
+            let moves = || self.rig.instances.iter().any(|placement| placement.instance == index as u32);
             let material = self.materials.get(mesh.material as usize);
             let placed = |&corner: &u32| {
                 mesh.positions.get(corner as usize).map_or(Vec3::NAN, |p| instance.transform.transform_point3(*p))
             };
-            // As flattening leaves it out, a triangle without area does not shine.
+            // As flattening leaves it out, a triangle without area does not shine; one that moves may gain some.
             material
-                .is_some_and(|material| material.emissive != Vec3::ZERO && !self.is_black(material.emissive_texture))
-                && mesh
-                    .indices
-                    .as_chunks()
-                    .0
-                    .iter()
-                    .any(|corners| face_normal(corners.each_ref().map(placed)).is_some())
+                .is_some_and(|material| material.emitted() != Vec3::ZERO && !self.is_black(material.emissive_texture))
+                && (moves()
+                    || mesh
+                        .indices
+                        .as_chunks()
+                        .0
+                        .iter()
+                        .any(|corners| face_normal(corners.each_ref().map(placed)).is_some()))
         };
         let bright = |environment: &Environment| environment.pixels.iter().flatten().any(|&c| c > 0.0);
         self.lights.iter().any(|light| light.intensity != Vec3::ZERO)
             || self.environment.as_ref().is_some_and(bright)
             || self.sun.is_some_and(|sun| sun.irradiance != Vec3::ZERO)
-            || self.instances.iter().any(emits)
+            || self.instances.iter().enumerate().any(emits)
     }
 
     /// Whether there is a texture and it is black all over.

@@ -9,7 +9,7 @@ pub mod builtin;
 pub mod bvh;
 pub mod environment;
 #[cfg(not(target_arch = "wasm32"))]
-pub(crate) mod files;
+pub mod files;
 pub mod flat;
 pub mod gltf;
 pub mod gpu_types;

@@ -238,7 +238,7 @@ impl Body {
 
     /// Builds the bottom level for the shape that it has, and gives that; none where there is no room for so many nodes.
     fn rebuild(&mut self) -> Option<Shape> {
-        let rebuilt = bvh::build(&self.triangles);
+        let rebuilt = bvh::build_with(&self.triangles, bvh::Preset::Quick);
         if rebuilt.nodes.len() > self.capacity {
             // What was refitted is as good as it gets for a while.
             self.built_cost = bvh::cost(&self.nodes);

@@ -2,6 +2,24 @@
 // with probability proportional to its resampling weight.
 #include "scene/lights.wgsl"
 
+// What a surface scatters of light from a direction: a dispersing one each colour by its own index of refraction, as a path
+// that has chosen its colour sees it.
+fn direct_scatter(surface: Surface, wi: vec3f, distance: f32) -> vec3f {
+    if scene_has_dispersion {
+        let own = surface.boundary;
+        if own != NONE && extension_factors(own, 3u).y > 0.0 {
+            var value = vec3f(0.0);
+            for (var c = 0u; c < 3u; c += 1u) {
+                var seen = surface;
+                surface_set_media(&seen, select(own, NONE, seen.is_front), select(NONE, own, seen.is_front), c + 1u);
+                value[c] = surface_scatter(seen, wi, distance)[c];
+            }
+            return value;
+        }
+    }
+    return surface_scatter(surface, wi, distance);
+}
+
 // The target function of direct light: luminance of the unshadowed integrand, p-hat = lum(f L G)
 // (Bitterli et al. 2020, section 3). `previous` evaluates it in the previous frame.
 fn target_function(surface: Surface, sample: LightSample, previous: bool) -> f32 {
@@ -9,7 +27,7 @@ fn target_function(surface: Surface, sample: LightSample, previous: bool) -> f32
         return 0.0;
     }
     let light = light_contribution(sample, surface.position, previous);
-    return luminance(surface_scatter(surface, light.direction, light.distance) * light.value);
+    return luminance(direct_scatter(surface, light.direction, light.distance) * light.value);
 }
 
 // Resampling weight w = m p-hat / p of one candidate, with m = 1 / M for M candidates of one kind.
@@ -31,12 +49,6 @@ fn stream_contribution_weight(stream: Stream, target_value: f32) -> f32 {
     return weight;
 }
 
-// f L G of a light sample, without the visibility V.
-fn unshadowed_contribution(surface: Surface, sample: LightSample) -> vec3f {
-    let light = light_contribution(sample, surface.position, false);
-    return surface_scatter(surface, light.direction, light.distance) * light.value;
-}
-
 // V between a surface and a light sample, in this frame or, for a surface of the previous one, in that.
 fn sample_is_visible(surface: Surface, sample: LightSample, previous: bool) -> bool {
     let light = light_contribution(sample, surface.position, previous);
@@ -51,7 +63,7 @@ fn shade_reservoir(surface: Surface, reservoir: Reservoir) -> vec3f {
     }
     let sample = reservoir_sample(reservoir);
     let light = light_contribution(sample, surface.position, false);
-    let unshadowed = surface_scatter(surface, light.direction, light.distance) * light.value;
+    let unshadowed = direct_scatter(surface, light.direction, light.distance) * light.value;
     if luminance(unshadowed) <= 0.0 || !is_visible(surface, light.direction, light.distance) {
         return vec3f(0.0);
     }

@@ -133,10 +133,12 @@ impl<'a> Targets<'a> {
     }
 }
 
+/// Largest file of rays.
+const MAX_RAY_BYTES: u64 = 1 << 30;
+
 /// The rays of a file: 32 bytes each.
 pub fn read(path: &Path) -> Result<Vec<BenchRay>> {
-    let io = |source| Error::Io { path: path.display().to_string(), source };
-    let bytes = std::fs::read(path).map_err(io)?;
+    let bytes = restir::scene::files::read(path, MAX_RAY_BYTES)?;
     if bytes.is_empty() || !bytes.len().is_multiple_of(size_of::<BenchRay>()) {
         let what = format!("{} holds {} bytes, not a whole number of rays of 32", path.display(), bytes.len());
         return Err(Error::bad_value("rays", what));

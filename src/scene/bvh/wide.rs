@@ -10,7 +10,7 @@ use glam::Vec3;
 pub const LEAF: u32 = 1 << 31;
 /// Where a leaf's number of items less one begins.
 const COUNT_SHIFT: u32 = 28;
-/// Most items in a leaf, and most triangles or instances that can be named.
+/// Most items in a leaf, which names them in 28 bits.
 pub const MAX_ITEMS: u32 = 8;
 /// Most entries that the traversal's stack needs for a bottom level and for a top level. With an entry between the two they
 /// fit `BVH_STACK` in `shaders/scene/bvh.wgsl`.

@@ -151,8 +151,9 @@ pub(super) fn build(scene: &Scene, progress: &mut dyn FnMut(f32, &str)) -> Resul
     levels.deformers.check(&triangles, &levels.rig.instances).map_err(|(place, what)| Error::bad_value(place, what))?;
     let root_boxes: Vec<[Vec3; 2]> = levels.instances.iter().map(|i| levels.box_of(i)).collect();
     if levels.has_top() {
-        let top = top_level(&root_boxes, levels.nodes.len() as u32);
-        levels.depth += bvh::MAX_TOP_DEPTH;
+        let first = levels.nodes.len();
+        let top = top_level(&root_boxes, first as u32);
+        levels.depth += depth(&top, first);
         levels.nodes.extend(top);
     }
     Ok(levels)
@@ -249,7 +250,7 @@ impl Levels {
 
     fn box_of(&self, instance: &FlatInstance) -> [Vec3; 2] {
         let root = &self.nodes[self.meshes[instance.mesh as usize].root as usize];
-        transformed_box(instance.transform, [root.min, root.max])
+        transformed_box(instance.transform, [root.min, root.max]).unwrap_or(NOWHERE)
     }
 }
 
@@ -257,12 +258,13 @@ fn instance(mesh: u32, transform: Mat4, source: u32) -> FlatInstance {
     FlatInstance { transform, mesh, first_light: 0, source, padding: 0 }
 }
 
-/// The box round a transformed box; a point out of everything's way for a transform that cannot be undone, or that leads out
-/// of the world.
-pub(crate) fn transformed_box(transform: Mat4, [min, max]: [Vec3; 2]) -> [Vec3; 2] {
-    let nowhere = [Vec3::splat(MAX_COORDINATE); 2];
+/// Stands in the top level for the box of what has no place: a point out of everything's way.
+pub(crate) const NOWHERE: [Vec3; 2] = [Vec3::splat(MAX_COORDINATE); 2];
+
+/// The box round a transformed box; none for a transform that cannot be undone, or that leads out of the world.
+pub(crate) fn transformed_box(transform: Mat4, [min, max]: [Vec3; 2]) -> Option<[Vec3; 2]> {
     if !is_invertible(transform) {
-        return nowhere;
+        return None;
     }
     let center = transform.transform_point3(0.5 * (min + max));
     let linear = Mat3::from_mat4(transform);
@@ -271,11 +273,11 @@ pub(crate) fn transformed_box(transform: Mat4, [min, max]: [Vec3; 2]) -> [Vec3; 
     // False for what is not a number, too.
     let is_within = (center.abs() + extent).max_element() <= MAX_COORDINATE;
     if !is_within {
-        return nowhere;
+        return None;
     }
     // Rounding must not cut anything off.
     let margin = 1e-6 * (extent + center.abs());
-    [center - extent - margin, center + extent + margin]
+    Some([center - extent - margin, center + extent + margin])
 }
 
 /// The nodes of a top level whose root stands at `first` of all nodes: always `2 n - 1` for n instances, so that it can be
@@ -284,6 +286,17 @@ pub(crate) fn top_level(boxes: &[[Vec3; 2]], first: u32) -> Vec<BvhNode> {
     let mut nodes = bvh::build_top(boxes);
     nodes.iter_mut().filter(|node| node.count == 0).for_each(|node| node.first += first);
     nodes
+}
+
+/// Nodes on the longest path from the root of a top level whose root stands at `first` of all nodes.
+fn depth(top: &[BvhNode], first: usize) -> u32 {
+    let mut depths = vec![1; top.len()];
+    for (i, node) in top.iter().enumerate().filter(|(_, node)| node.count == 0) {
+        let child = node.first as usize - first;
+        let below = depths[i] + 1;
+        depths[child..child + 2].fill(below);
+    }
+    depths.into_iter().max().unwrap_or(0)
 }
 
 /// The three rows of an affine matrix.

@@ -70,6 +70,16 @@ pub(super) fn emitters(
     emitters
 }
 
+/// What moves may gain area after time 0, or come near: each of its triangles is drawn at least a thousandth as often as all
+/// are on average. A light of probability 0 would be missing from every estimate that draws lights.
+pub(super) fn keep_movers(emitters: &mut Emitters, moves: impl Fn(u32) -> bool) {
+    let total: f64 = emitters.iter().map(|(_, weight)| weight).sum();
+    let least = if total > 0.0 { 1e-3 * total / emitters.len() as f64 } else { 1.0 };
+    for (_, weight) in emitters.iter_mut().filter(|(light, _)| moves(light.instance)) {
+        *weight = weight.max(least);
+    }
+}
+
 /// The area of a shape over that of the parallelogram of its edges.
 fn area_factor(shape: Shape) -> f64 {
     match shape {

@@ -24,6 +24,7 @@ use super::gpu_types::{BvhNode, Light, Material, MaterialExtensions, NONE, Trian
 use super::{Camera, MAX_COORDINATE, Projection, PunctualKind, Rig, Scene, bvh, rig};
 use crate::error::{Error, Result};
 use glam::{Mat4, Vec3};
+use std::collections::HashSet;
 
 /// Images of about one size, each with its mip chain, in layers of one size. Texels are as stored in the files (sRGB where
 /// the file says so).
@@ -216,12 +217,13 @@ impl FlatScene {
             None => None,
         };
         let emission = emission::Emission::new(scene);
-        let emitters = lights::emitters(&mut triangles, &meshes, &mut instances, &attributes, &emission);
+        let mut emitters = lights::emitters(&mut triangles, &meshes, &mut instances, &attributes, &emission);
+        let movers: HashSet<u32> = scene.rig.instances.iter().map(|placement| placement.instance).collect();
+        lights::keep_movers(&mut emitters, |instance| movers.contains(&instances[instance as usize].source));
         let (lights, first_punctual) =
             lights::build(emitters, &scene.lights, scene.sun.as_ref(), environment.is_some())?;
 
-        let root = if has_top(&meshes) { nodes.len() + 1 - 2 * instances.len() } else { 0 };
-        let bounds = bounds(nodes.get(root), scene);
+        let bounds = bounds(&instances, &meshes, &nodes, scene);
         let mut flat = FlatScene {
             name: scene.name.clone(),
             cameras: Vec::new(),
@@ -259,7 +261,7 @@ impl FlatScene {
             emissive_triangles: u64::from(first_punctual),
             bvh_nodes: flat.nodes.len() as u64,
             bvh_depth: depth,
-            bvh_cost: bvh::cost(&flat.nodes),
+            bvh_cost: bvh::cost(flat.nodes.get(flat.root() as usize..).unwrap_or_default()),
             gpu_bytes: flat.gpu_bytes(),
         };
         progress(1.0, "done");
@@ -306,13 +308,22 @@ fn has_top(meshes: &[FlatMesh]) -> bool {
 }
 
 /// The box of the triangles, point and spot lights.
-fn bounds(root: Option<&BvhNode>, scene: &Scene) -> [Vec3; 2] {
-    let root = root.map_or([Vec3::ZERO; 2], |root| [root.min, root.max]);
+fn bounds(instances: &[FlatInstance], meshes: &[FlatMesh], nodes: &[BvhNode], scene: &Scene) -> [Vec3; 2] {
+    // Not the root of the top level: what has no place is in its box.
+    let boxes = instances.iter().filter_map(|instance| {
+        let root = nodes.get(meshes.get(instance.mesh as usize)?.root as usize)?;
+        if !has_top(meshes) {
+            Some([root.min, root.max])
+        } else {
+            levels::transformed_box(instance.transform, [root.min, root.max])
+        }
+    });
+    let all = boxes.reduce(|[a, b], [min, max]| [a.min(min), b.max(max)]).unwrap_or_default();
     let placed = scene.lights.iter().filter(|light| light.kind != PunctualKind::Directional);
     let reach = Vec3::splat(MAX_COORDINATE);
     placed
         .map(|light| light.position.clamp(-reach, reach))
-        .fold(root, |[min, max], position| [min.min(position), max.max(position)])
+        .fold(all, |[min, max], position| [min.min(position), max.max(position)])
 }
 
 /// The scene's usable cameras, or one that shows it from inside or outside.

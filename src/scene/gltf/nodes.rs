@@ -278,7 +278,8 @@ impl Loader<'_> {
 fn is_rigged(document: &Document) -> bool {
     let root = &document.root;
     let morphs = || root.meshes.iter().flat_map(|mesh| &mesh.primitives).any(|p| p.targets.is_some());
-    !root.animations.is_empty() || !root.skins.is_empty() || morphs()
+    let skinned = || root.nodes.iter().any(|node| node.skin.is_some());
+    !root.animations.is_empty() || !root.skins.is_empty() || morphs() || skinned()
 }
 
 /// Morph targets of glTF mesh `index`: as many in every primitive.
