@@ -34,6 +34,12 @@ const launchers = {
     }),
 };
 
+/**
+ * What the times that tests demand are multiplied by. They hold on two quiet cores; continuous integration runs on machines of
+ * unknown speed beside unknown others, and there only what is far off is told.
+ */
+export const slack = process.env.CI ? 2 : 1;
+
 /** The browser that BROWSER names: chromium or firefox. */
 export const browserName = process.env.BROWSER ?? 'chromium';
 

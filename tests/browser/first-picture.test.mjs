@@ -1,7 +1,7 @@
 // How long a visitor waits. In a file of its own: no other browser runs meanwhile.
 import { strict as assert } from 'node:assert';
 import { test } from 'node:test';
-import { browserName } from './browsers.mjs';
+import { browserName, slack } from './browsers.mjs';
 import { assertNoProblems, openPage, openSite, waitForFrames } from './pages.mjs';
 
 /** Milliseconds from navigation to the first picture, in a browser just started: nothing is cached. */
@@ -21,9 +21,9 @@ async function firstPicture() {
 const onlyChromium = { skip: browserName !== 'chromium' };
 
 test('shows a first picture of cornell within 5 s of navigation', onlyChromium, async (context) => {
-  const times = [];
+  const [times, limit] = [[], 5000 * slack];
   // Other work on the machine only adds to the time, so the best of three is the nearest to the truth.
-  while (times.length < 3 && !(times.at(-1) < 5000)) times.push(await firstPicture());
+  while (times.length < 3 && !(times.at(-1) < limit)) times.push(await firstPicture());
   context.diagnostic(`first picture after ${times.map((time) => time.toFixed(0)).join(', ')} ms`);
-  assert.ok(times.at(-1) < 5000, `first picture after ${times.map((time) => time.toFixed(0)).join(', ')} ms`);
+  assert.ok(times.at(-1) < limit, `first picture after ${times.map((time) => time.toFixed(0)).join(', ')} ms`);
 });
