@@ -100,9 +100,9 @@ fn taxicab(v: vec3f) -> f32 {
 
 // The test of Möller and Trumbore 1997, watertight by letting rounding pass: w1, w2 and what the sum leaves for the third
 // corner are determinants, exact but for a few units of roundoff of the products they are made of. So of two triangles
-// that share an edge, or of all that share a corner, one takes a ray between them. `rounding` is one unit of all products,
-// more than enough for those of three vectors across each other; ten million rays have found no gap (docs/testing.md). A
-// triangle seen from its back is missed unless it is double-sided (glTF 2.0, 3.9.6).
+// that share an edge, or of all that share a corner, one takes a ray between them. `rounding` is one unit of the products
+// of L1 norms: no bound of the worst case, which is eight times that, but ten million rays have found no gap
+// (docs/testing.md). A triangle seen from its back is missed unless it is double-sided (glTF 2.0, 3.9.6).
 fn intersect_triangle(index: u32, instance: u32, origin: vec3f, direction: vec3f, hit: ptr<function, Hit>) {
     let triangle = load_triangle(index);
     if scene_has_shapes && shape_of(triangle.flags) != SHAPE_TRIANGLE {
