@@ -49,7 +49,7 @@ class App {
     play: (on) => this.setAccumulate(!on),
     seek: (seconds) => {
       this.state.time = seconds;
-      this.change((viewer) => viewer.set_time(seconds));
+      return this.change((viewer) => viewer.set_time(seconds));
     },
     speed: (factor) => {
       this.state.speed = factor;
@@ -318,14 +318,14 @@ class App {
   }
 
   /** Changes the picture between two frames, and the address with it. What only shows the film otherwise needs no new frame. */
-  private change(work: (viewer: Viewer) => void, onlyFilm = false): void {
+  private change(work: (viewer: Viewer) => void, onlyFilm = false): Promise<void> {
     const shown = (viewer: Viewer) => {
       work(viewer);
       viewer.present();
     };
     const done = onlyFilm ? this.loop.call(shown) : this.loop.change(work);
-    done.catch((error: unknown) => showError(error));
     this.writeUrl();
+    return done.catch((error: unknown) => showError(error));
   }
 
   // Menus and events

@@ -6,8 +6,8 @@ import { fillMenu } from './panel.js';
 export interface TimeEvents {
   /** Time shall run, or stand still. */
   play(on: boolean): void;
-  /** The picture shall show this moment. */
-  seek(seconds: number): void;
+  /** The picture shall show this moment. Resolves when it is the viewer's. */
+  seek(seconds: number): Promise<void>;
   /** Time shall run this many times as fast. */
   speed(factor: number): void;
   /** Another animation shall be played, by its index. */
@@ -24,11 +24,14 @@ export class TimeControls {
   private readonly animations = byId('animation', HTMLSelectElement);
   private report: SceneReport | undefined;
   private playing = false;
+  /** Moments asked for that the viewer has not taken yet. */
+  private seeking = 0;
 
   constructor(events: TimeEvents) {
     this.button.addEventListener('click', () => events.play(!this.playing));
     this.scrub.addEventListener('input', () => {
-      events.seek(Number(this.scrub.value));
+      this.seeking += 1;
+      void events.seek(Number(this.scrub.value)).finally(() => (this.seeking -= 1));
       this.showMoment(Number(this.scrub.value));
     });
     this.speedMenu.addEventListener('change', () => events.speed(Number(this.speedMenu.value)));
@@ -56,9 +59,12 @@ export class TimeControls {
     this.button.textContent = playing ? 'Stop time' : 'Play';
   }
 
-  /** Shows the moment of the last frame. Nothing is written while the user holds the slider. */
+  /**
+   * Shows the moment of the last frame. Nothing is written while the user holds the slider, or while a frame from before the last
+   * step of the slider is finished: the next step would start from there.
+   */
   showTime(seconds: number): void {
-    if (this.row.hidden || this.scrub.matches(':active')) return;
+    if (this.row.hidden || this.seeking > 0 || this.scrub.matches(':active')) return;
     const duration = this.duration();
     // The end of a loop is shown as its end, not as the start of the next.
     const moment = seconds >= 0 && seconds <= duration ? seconds : seconds - Math.floor(seconds / duration) * duration;
