@@ -34,7 +34,7 @@ pub enum Error {
         what: String,
     },
     /// A name (scene, technique, parameter, view, camera) is not known.
-    #[error("unknown {kind} '{name}'; known: {known}")]
+    #[error("unknown {kind} '{name}'; {}", if known.is_empty() { "there are none".into() } else { format!("known: {known}") })]
     Unknown {
         /// What kind of thing was named.
         kind: &'static str,

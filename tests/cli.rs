@@ -484,6 +484,11 @@ fn bench_rays_traces_a_file() {
     assert!((f32::from_bits(words[0]) - 0.3).abs() < 0.05 && words[1] != u32::MAX, "{words:?}");
     assert_eq!(words[2..], [100f32.to_bits(), u32::MAX, 0.1f32.to_bits(), u32::MAX]);
 
+    let overwrite = restir(&["bench", "rays", "builtin:cornell", "--rays", &file, "--hits", &file]);
+    assert_eq!((overwrite.status.code(), std::fs::read(&file).unwrap()), (Some(2), rays.clone()));
+    let nowhere = restir(&["bench", "rays", "builtin:cornell", "--eye", "1,2,3", "--target", "1,2,3"]);
+    assert_eq!(nowhere.status.code(), Some(2));
+
     let short = folder.write("short.bin", &rays[..31]);
     let endless = restir(&["bench", "rays", "builtin:cornell", "--rays", "/dev/zero"]);
     assert_eq!(endless.status.code(), Some(1), "what never ends is not read");
