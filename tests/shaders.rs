@@ -231,7 +231,6 @@ fn enumeration(prefix: &str) -> BTreeMap<String, usize> {
 fn shaders_number_choices_as_declared() {
     let restir_di = techniques::find("restir-di").expect("a technique").params;
     let choices = [
-        ("BIAS_CORRECTION_", restir_di, "bias_correction"),
         ("TONE_MAP_", FilmParams::SPECS, "tone_map"),
         ("MIS_", RenderParams::SPECS, "mis_heuristic"),
         ("PIXEL_FILTER_", RenderParams::SPECS, "pixel_filter"),

@@ -72,7 +72,11 @@ fn restir_di_equals_the_path_tracer() {
         // As the defaults have it: spatial reuse for young pixels alone, and not fed back.
         &[("spatial_confidence_limit", "3"), ("spatial_feedback", "no"), ("reservoir_size", "4")],
         // Without visibility reuse supports are told apart by target functions alone, so this is unbiased too.
-        &[("bias_correction", "mis"), ("visibility_reuse", "no")],
+        &[("visibility_in_weights", "no"), ("visibility_reuse", "no")],
+        &[("reuse_weights", "1/z")],
+        &[("reuse_weights", "pairwise")],
+        &[("reuse_weights", "pairwise"), ("visibility_in_weights", "no"), ("visibility_reuse", "no")],
+        &[("reuse_weights", "defensive")],
     ];
     for settings in unbiased {
         let comparison = compare(&format!("unbiased {settings:?}"), &mut restir(&gpu, settings), RUNS);
@@ -84,42 +88,67 @@ fn restir_di_equals_the_path_tracer() {
 fn planted_biases_are_caught() {
     let gpu = gpu();
     // Biased settings are plants that need no edit.
-    for bias_correction in ["none", "mis"] {
-        let mut renderer = restir(&gpu, &[("bias_correction", bias_correction)]);
-        let comparison = compare(bias_correction, &mut renderer, RUNS / 4);
-        assert!(comparison.is_caught(), "bias_correction = {bias_correction} went unnoticed");
+    for (weights, visibility) in [
+        ("constant", "yes"),
+        ("heuristics", "yes"),
+        ("1/z", "no"),
+        ("balance", "no"),
+        ("pairwise", "no"),
+        ("defensive", "no"),
+    ] {
+        let settings = [("reuse_weights", weights), ("visibility_in_weights", visibility)];
+        let comparison = compare(&format!("biased {settings:?}"), &mut restir(&gpu, &settings), RUNS / 4);
+        assert!(comparison.is_caught(), "{settings:?} went unnoticed");
     }
-    // Each: what, the file, what stands there, what is put in its place.
+    // Each: what, with which weights, the file, what stands there, what is put in its place.
     let plants = [
         (
             "visibility left out of the weights",
-            "techniques/restir-di/combine.wgsl",
+            "balance",
+            "techniques/common/combine.wgsl",
             "return select(0.0, value, sample_is_visible(surface, sample, previous));",
             "return value + select(0.0, 1e-30, sample_is_visible(surface, sample, previous));",
         ),
         (
             "history offered above its weight",
+            "balance",
             "techniques/restir-di/temporal.wgsl",
             "    combination_offer(history);",
             "    history.unbiased_contribution_weight *= 1.0 + 0.1 * history.confidence_weight;\n    combination_offer(history);",
         ),
         (
             "samples weighted by the canonical pixel's share in place of their own",
-            "techniques/restir-di/combine.wgsl",
+            "balance",
+            "techniques/common/combine.wgsl",
             "        if i == j {\n            mis_numerators[i] = share;",
             "        if j == 0u {\n            mis_numerators[i] = share;",
         ),
         (
+            "the canonical sample's part of one pair left out",
+            "pairwise",
+            "techniques/common/combine.wgsl",
+            "if denominator <= 0.0 {",
+            "if denominator <= 0.0 || (i == 0u && j == 2u) {",
+        ),
+        (
+            "the canonical sample weighed by the confidence of the others",
+            "defensive",
+            "techniques/common/combine.wgsl",
+            "mis_numerators[0] += share * canonical *",
+            "mis_numerators[0] += share * others *",
+        ),
+        (
             "the candidate count left out of the initial weights' mean",
+            "balance",
             "techniques/common/resampling.wgsl",
             "(pdf * f32(candidate_count))",
             "(pdf * f32(candidate_count - 1u))",
         ),
     ];
-    for (what, file, old, new) in plants {
+    for (what, weights, file, old, new) in plants {
         let folder = ShaderCopy::new();
         let gpu = fresh_gpu();
-        let mut renderer = restir(&gpu, &[]);
+        let mut renderer = restir(&gpu, &[("reuse_weights", weights)]);
         render(&mut renderer, 1);
         gpu.watch_shaders(&folder.0);
         folder.edit(file, old, new);

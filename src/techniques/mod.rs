@@ -3,6 +3,7 @@
 mod normals;
 mod path_tracer;
 mod restir_di;
+pub mod reuse;
 mod ris;
 
 use crate::error::{Error, Result};

@@ -17,15 +17,10 @@ struct RestirDiParams {
     spatial_confidence_limit: f32,
     spatial_feedback: u32,
     reservoir_size: u32,
-    bias_correction: u32,
+    reuse_weights: u32,
+    visibility_in_weights: u32,
     indirect: u32,
 }
-
-// What they mean: combine.wgsl.
-const BIAS_CORRECTION_NONE = 0u;
-const BIAS_CORRECTION_Z = 1u;
-const BIAS_CORRECTION_MIS = 2u;
-const BIAS_CORRECTION_MIS_VISIBILITY = 3u;
 
 const MAXIMUM_RESERVOIR_SIZE = 4u;
 

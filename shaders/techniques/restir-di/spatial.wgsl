@@ -4,7 +4,8 @@
 // Source: Bitterli et al. 2020, Algorithm 5, lines 13 to 19; thesis 001, section 5.4 (depth and normal thresholds).
 #include "scene/visibility_buffer.wgsl"
 #include "scene/counters.wgsl"
-#include "techniques/restir-di/combine.wgsl"
+#include "techniques/common/combine.wgsl"
+#include "techniques/restir-di/params.wgsl"
 
 struct PassIndex {
     value: u32,
@@ -20,6 +21,9 @@ fn view_depth(position: vec3f) -> f32 {
 
 // Whether a neighbour is like enough to help. It looks only at surfaces, never at samples, so it adds no bias.
 fn is_similar(surface: Surface, neighbor: Surface) -> bool {
+    if reuse_everything {
+        return true;
+    }
     let depth = view_depth(surface.position);
     return abs(view_depth(neighbor.position) - depth) <= params.spatial_depth_threshold * abs(depth)
         && dot(surface.basis.normal, neighbor.basis.normal) >= params.spatial_normal_threshold;
@@ -58,8 +62,7 @@ fn reuse_pixel(pixel: vec2u) {
         for (var j = 0u; j < found; j += 1u) {
             combination_offer(reservoirs[reservoir_index(domains[j], slot)]);
         }
-        let needed = select(1u, found, needs_every_domain());
-        for (var j = 0u; j < needed; j += 1u) {
+        for (var j = 0u; j < combination_valuers(); j += 1u) {
             combination_value(load_pixel(domains[j]), j, false);
         }
         reservoirs_out[reservoir_index(pixel, slot)] = combination_finish(&rng);

@@ -7,7 +7,8 @@
 // albedo); history cap of Bitterli et al. 2020, section 4.2.
 #include "scene/visibility_buffer.wgsl"
 #include "scene/counters.wgsl"
-#include "techniques/restir-di/combine.wgsl"
+#include "techniques/common/combine.wgsl"
+#include "techniques/restir-di/params.wgsl"
 
 @group(1) @binding(2) var previous_visibility: texture_2d<u32>;
 @group(1) @binding(4) var<storage, read> reservoirs: array<Reservoir>;
@@ -50,7 +51,7 @@ fn combine_slot(pixel: vec2u, previous_pixel: vec2u, slot: u32, surface: Surface
     combination_offer(current);
     combination_offer(history);
     // A loop rather than two calls, for each call is inlined.
-    for (var j = 0u; j < 2u; j += 1u) {
+    for (var j = 0u; j < combination_valuers(); j += 1u) {
         var domain = surface;
         if j == 1u {
             domain = previous;
@@ -86,7 +87,7 @@ fn reuse_pixel(pixel: vec2u) {
     }
     // Triangles are numbered for their frame, instances are those of this one.
     let previous = load_seen(frame.previous_camera, previous_instance(seen.x), seen.y, bitcast<vec2f>(seen.zw));
-    if !is_same_surface(surface, position, previous) {
+    if !reuse_everything && !is_same_surface(surface, position, previous) {
         keep(pixel);
         return;
     }
