@@ -302,7 +302,8 @@ impl Experiment {
 
     /// What is drawn along the horizontal axis.
     pub fn axis(&self) -> Axis {
-        let several = self.frames.len() > 1 || self.series.iter().any(|s| s.frames.as_ref().is_some_and(|f| f.len() > 1));
+        let several =
+            self.frames.len() > 1 || self.series.iter().any(|s| s.frames.as_ref().is_some_and(|f| f.len() > 1));
         let natural = match (self.sweeps.is_empty(), several) {
             (false, _) => Axis::Sweep,
             (true, true) => Axis::Frame,

@@ -109,7 +109,8 @@ where
     let fault = |error: DrawingAreaErrorKind<_>| format!("'{}': {error}", plot.title);
     let ink = |size: u32| (FONT, size).into_font().color(&INK.0);
     let area = SVGBackend::with_string(text, SIZE).into_drawing_area();
-    let (left, right) = area.split_horizontally(SIZE.0 - LEGEND);
+    let named = plot.curves.iter().any(|curve| !curve.name.is_empty());
+    let (left, right) = area.split_horizontally(SIZE.0 - if named { LEGEND } else { 0 });
     let mut chart = ChartBuilder::on(&left)
         .caption(plot.title, ink(17))
         .margin(8)

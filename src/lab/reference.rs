@@ -92,8 +92,7 @@ pub fn reference(
             progress(half as u64 * u64::from(frames) + u64::from(frame) + 1, 2 * u64::from(frames));
         }
         let image = block_on(renderer.read_image())?;
-        std::fs::create_dir_all(folder)
-            .map_err(|source| Error::Io { path: folder.display().to_string(), source })?;
+        std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.display().to_string(), source })?;
         let parameters = renderer.parameters().to_string();
         let picture = ExrPicture {
             image: &image,

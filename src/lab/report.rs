@@ -59,7 +59,11 @@ fn head(findings: &Findings) -> String {
         experiment.runs,
         experiment.reference.frames,
         settings::describe(&experiment.reference.settings),
-        if findings.software { " Times are those of a software adapter on the CPU: only their ratios mean anything." } else { "" },
+        if findings.software {
+            " Times are those of a software adapter on the CPU: only their ratios mean anything."
+        } else {
+            ""
+        },
     );
     page
 }
@@ -97,7 +101,11 @@ fn markdown_table(experiment: &Experiment, points: &[&Point]) -> String {
     let by_frame = points.iter().any(|point| point.frames.len() > 1);
     let titles: Vec<&str> = experiment.metrics.iter().map(|metric| metric.title()).collect();
     let frame_head = if by_frame { " frame |" } else { "" };
-    let mut table = format!("| |{frame_head} {} |\n|---|{}\n", titles.join(" | "), "---|".repeat(titles.len() + usize::from(by_frame)));
+    let mut table = format!(
+        "| |{frame_head} {} |\n|---|{}\n",
+        titles.join(" | "),
+        "---|".repeat(titles.len() + usize::from(by_frame))
+    );
     for point in points {
         for &frame in &point.frames {
             let cells: Vec<String> =
@@ -147,7 +155,8 @@ fn plot_of(experiment: &Experiment, site: &Site, points: &[&Point], metric: Metr
     let mut curves: Vec<Curve> = Vec::new();
     let mut categories: Option<Vec<String>> = (!numeric).then(Vec::new);
     for point in points {
-        let frames = if matches!(axis, Axis::Frame | Axis::Time) { point.frames.clone() } else { vec![point.last_frame()] };
+        let frames =
+            if matches!(axis, Axis::Frame | Axis::Time) { point.frames.clone() } else { vec![point.last_frame()] };
         // Along frames and time every point is a curve; along a sweep those of one series are; side by side all are one.
         let name = match axis {
             Axis::Frame | Axis::Time => point.label(experiment),
@@ -163,7 +172,11 @@ fn plot_of(experiment: &Experiment, site: &Site, points: &[&Point], metric: Metr
             let x = match &mut categories {
                 None => results::abscissa(axis, point, frame).unwrap_or(0.0),
                 Some(names) => {
-                    let name = if axis == Axis::Series { point.label(experiment) } else { point.value.clone().unwrap_or_default() };
+                    let name = if axis == Axis::Series {
+                        point.label(experiment)
+                    } else {
+                        point.value.clone().unwrap_or_default()
+                    };
                     let known = names.iter().position(|known| *known == name);
                     known.unwrap_or_else(|| {
                         names.push(name);

@@ -75,7 +75,8 @@ impl Point {
 
     /// Its name in tables and under pictures.
     pub fn label(&self, experiment: &Experiment) -> String {
-        let swept = experiment.sweeps.first().zip(self.value.as_ref()).map(|(sweep, value)| format!("{} = {value}", sweep.key));
+        let swept =
+            experiment.sweeps.first().zip(self.value.as_ref()).map(|(sweep, value)| format!("{} = {value}", sweep.key));
         match (self.series.is_empty(), swept) {
             (false, Some(swept)) => format!("{}, {swept}", self.series),
             (true, Some(swept)) => swept,

@@ -182,7 +182,8 @@ impl Lab<'_> {
         let exposure = Exposure::of(&stand.reference.image);
         let reference_tile = self.points_folder.join(format!("{}.png", stand.reference.key));
         write_tile(&reference_tile, &stand.reference.image, exposure)?;
-        let reference_label = if site.tiles.is_empty() { "reference".to_owned() } else { format!("{scene}: reference") };
+        let reference_label =
+            if site.tiles.is_empty() { "reference".to_owned() } else { format!("{scene}: reference") };
         site.tiles.push((reference_label, reference_tile));
         let mut found: Vec<Point> = Vec::new();
         let mut warm = HashSet::new();
@@ -208,7 +209,8 @@ impl Lab<'_> {
                 let name = key::of(&identity);
                 let [numbers, tile] = ["json", "png"].map(|e| self.points_folder.join(format!("{name}.{e}")));
                 // The strip shows the first run.
-                let kept = if self.options.fresh || (number == 0 && !tile.exists()) { None } else { Run::read(&numbers) };
+                let kept =
+                    if self.options.fresh || (number == 0 && !tile.exists()) { None } else { Run::read(&numbers) };
                 let run = match kept {
                     Some(run) => {
                         self.outcome.kept += 1;

@@ -40,15 +40,17 @@ pub struct Tile {
 }
 
 /// The middle of a picture.
-pub fn tile(image: &Image, Exposure(scale): Exposure) -> Tile {
+pub fn tile(image: &Image, Exposure(gain): Exposure) -> Tile {
     let [width, height] = [image.width.min(TILE[0]), image.height.min(TILE[1])];
     let [left, top] = [(image.width - width) / 2, (image.height - height) / 2];
-    let mut rgba = Vec::with_capacity((width * height * 4) as usize);
-    for y in top..top + height {
-        for x in left..left + width {
-            let pixel = image.pixels[(y * image.width + x) as usize];
+    // Small pictures are shown with whole pixels enlarged.
+    let scale = (TILE[0] / width).min(TILE[1] / height).max(1);
+    let mut rgba = Vec::with_capacity((width * height * scale * scale * 4) as usize);
+    for y in 0..height * scale {
+        for x in 0..width * scale {
+            let pixel = image.pixels[((top + y / scale) * image.width + left + x / scale) as usize];
             let shown = pixel.map(|c| {
-                let linear = 1.0 - (-scale * f64::from(c).max(0.0)).exp();
+                let linear = 1.0 - (-gain * f64::from(c).max(0.0)).exp();
                 // IEC 61966-2-1.
                 let srgb = if linear <= 0.0031308 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
                 (srgb * 255.0).round() as u8
@@ -56,7 +58,7 @@ pub fn tile(image: &Image, Exposure(scale): Exposure) -> Tile {
             rgba.extend([shown[0], shown[1], shown[2], 255]);
         }
     }
-    Tile { width, height, rgba }
+    Tile { width: width * scale, height: height * scale, rgba }
 }
 
 /// Puts tiles, which are files of one size, into rows and writes them.

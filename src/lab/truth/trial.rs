@@ -137,6 +137,17 @@ pub struct Finding {
     pub regions: Comparison,
 }
 
+impl Claim {
+    /// Its settings in words.
+    pub fn what(&self) -> String {
+        if self.settings.is_empty() {
+            "the settings shared by all".to_owned()
+        } else {
+            settings::describe(&self.settings)
+        }
+    }
+}
+
 impl Trial {
     /// The techniques that have one.
     pub fn techniques() -> impl Iterator<Item = &'static str> {
@@ -210,9 +221,8 @@ pub fn check(
 ) -> Result<Vec<Finding>> {
     let of = 1 + trial.claims.len() + trial.plants.len();
     let less = |effort: Effort| if quick { Effort { runs: effort.runs / QUICK, ..effort } } else { effort };
-    let estimate = |renderer: &mut Renderer, effort: Effort| {
-        Estimate::radiance(renderer, effort.runs, effort.frames, trial.tile)
-    };
+    let estimate =
+        |renderer: &mut Renderer, effort: Effort| Estimate::radiance(renderer, effort.runs, effort.frames, trial.tile);
     heard("reference", 0, of);
     let gpu = device()?;
     let mut renderer = trial.renderer(gpu, scene)?;
@@ -220,7 +230,7 @@ pub fn check(
     let reference = estimate(&mut renderer, less(trial.reference))?;
     let mut findings = Vec::new();
     for claim in &trial.claims {
-        let what = settings::describe(&claim.settings);
+        let what = claim.what();
         heard(&what, 1 + findings.len(), of);
         settings::apply(&mut renderer, &trial.technique, &trial.settings_with(&claim.settings))?;
         let (step, effort) =
