@@ -17,6 +17,7 @@ fn main() {
     println!("cargo:rerun-if-changed=src/gpu/binding_kind.rs");
     println!("cargo:rerun-if-changed=src/gpu/shader_source.rs");
     println!("cargo:rerun-if-changed=shaders");
+    println!("cargo:rerun-if-changed=lab");
     let root = PathBuf::from(std::env::var("CARGO_MANIFEST_DIR").expect("cargo sets it")).join("shaders");
     let out = PathBuf::from(std::env::var("OUT_DIR").expect("cargo sets it"));
     let wasm = std::env::var("CARGO_CFG_TARGET_ARCH").is_ok_and(|arch| arch == "wasm32");
@@ -62,6 +63,9 @@ fn main() {
     assert!(errors.is_empty(), "{} shader(s) failed:\n{}", errors.len(), errors.join("\n"));
     writeln!(table, "/// Every pass.\npub static ALL: &[&Shader] = &[{}];", list(&names, |n| format!("&{n}"))).unwrap();
     std::fs::write(out.join("shaders.rs"), table).expect("OUT_DIR is writable");
+    for (folder, table) in [("lab", "experiments.rs"), ("lab/truth", "claims.rs")] {
+        std::fs::write(out.join(table), embedded(&root.join("..").join(folder))).expect("OUT_DIR is writable");
+    }
     // A second of work, and the same for every shader: only when its source is newer.
     let time = |path: &Path| std::fs::metadata(path).and_then(|m| m.modified()).ok();
     let albedo = out.join("albedo.bin");
@@ -84,6 +88,19 @@ fn collect(root: &Path, folder: &Path, passes: &mut Vec<String>) {
             }
         }
     }
+}
+
+/// A Rust array of (name, text) of every .toml file in a folder, by name.
+fn embedded(folder: &Path) -> String {
+    let entries = std::fs::read_dir(folder).expect("lab/ is readable");
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.expect("lab/ is readable").path()).collect();
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "toml"));
+    files.sort();
+    let entry = |file: &PathBuf| {
+        let file = file.canonicalize().expect("the file is there");
+        format!("({:?}, include_str!({:?}))", file.file_stem().unwrap_or_default().to_string_lossy(), file)
+    };
+    format!("&[{}]", list(&files, entry))
 }
 
 /// WGSL without its line comments (it has no strings that could hold a `//`).

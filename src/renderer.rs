@@ -276,14 +276,7 @@ impl Renderer {
             self.reset();
             return Ok(());
         }
-        let own = self.technique.info().params.iter().map(|s| s.name.to_owned());
-        let render = RenderParams::SPECS.iter().map(|s| format!("render.{}", s.name));
-        let film = FilmParams::SPECS.iter().map(|s| format!("film.{}", s.name));
-        Err(Error::Unknown {
-            kind: "parameter",
-            name: key.to_owned(),
-            known: own.chain(render).chain(film).collect::<Vec<_>>().join(", "),
-        })
+        self.technique.info().spec(key).map(|_| ())
     }
 
     /// Sets a parameter of the technique, or leaves it where the device has no room for what it needs then. Whether the

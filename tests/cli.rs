@@ -548,3 +548,16 @@ fn moments_and_sequences() {
         assert!(String::from_utf8_lossy(&output.stderr).contains(text), "{args:?}");
     }
 }
+
+#[test]
+fn experiments_are_listed_and_wrong_ones_refused() {
+    let list = succeed_json(&["lab", "list", "--json"]);
+    assert!(list.as_array().unwrap().iter().any(|entry| entry["name"] == "light-samples"));
+    assert!(succeed(&["lab", "list"]).contains("thesis 001"));
+    fail(&["lab", "light-sample"], 2, "UNKNOWN_NAME", "light-samples");
+    fail(&["lab", "nowhere.toml"], 1, "IO", "nowhere.toml");
+    fail(&["truth", "normals"], 2, "UNKNOWN_NAME", "restir-di");
+    let folder = Folder::new("lab");
+    let file = folder.write("broken.toml", b"title = 1");
+    fail(&["lab", &file], 1, "BAD_FILE", "line 1");
+}

@@ -1,6 +1,8 @@
 //! The written pages agree with the program: parameter tables, technique pages, links and command lines.
-//! `UPDATE_DOCS=1 cargo test --test docs` rewrites the parameter tables.
+//! `UPDATE_DOCS=1 cargo test --test docs` rewrites the tables of parameters and claims.
 
+use restir::lab::settings;
+use restir::lab::truth::Trial;
 use restir::params::{FilmParams, ParamKind, ParamSpec, Params, RenderParams};
 use restir::techniques::{self, TechniqueInfo};
 use std::collections::{BTreeMap, BTreeSet};
@@ -70,11 +72,11 @@ fn parameter_table(prefix: &str, specs: &[ParamSpec]) -> String {
 }
 
 /// Every generated table with the page it belongs to and its name there.
-fn tables() -> Vec<(PathBuf, &'static str, String)> {
+fn tables() -> Vec<(PathBuf, &'static str, &'static str, String)> {
     let global = root().join("docs/parameters.md");
     let mut tables = vec![
-        (global.clone(), "render", parameter_table("render.", RenderParams::SPECS)),
-        (global, "film", parameter_table("film.", FilmParams::SPECS)),
+        (global.clone(), "parameters", "render", parameter_table("render.", RenderParams::SPECS)),
+        (global, "parameters", "film", parameter_table("film.", FilmParams::SPECS)),
     ];
     tables.extend(techniques::ALL.iter().map(|info| {
         let views = info.views.iter().map(|v| format!("`{v}`")).collect::<Vec<_>>().join(", ");
@@ -82,26 +84,43 @@ fn tables() -> Vec<(PathBuf, &'static str, String)> {
         if !views.is_empty() {
             table += &format!("\nDebug views of its own: {views}.\n");
         }
-        (technique_page(info), info.id, table)
+        (technique_page(info), "parameters", info.id, table)
+    }));
+    tables.extend(Trial::techniques().map(|id| {
+        let info = techniques::find(id).expect("a technique");
+        (technique_page(info), "claims", id, claims_table(id))
     }));
     tables
 }
 
+/// What a technique claims, as its trial puts it to the proof.
+fn claims_table(technique: &str) -> String {
+    let trial = Trial::find(technique).expect("a sound file");
+    let mut table = String::from("| settings | claim | because |\n|---|---|---|\n");
+    for claim in &trial.claims {
+        let says = if claim.unbiased { "unbiased" } else { "biased" };
+        table += &format!("| {} | {says} | {} |\n", claim.what(), claim.because);
+    }
+    let shared = settings::describe(&trial.settings);
+    let plants: Vec<&str> = trial.plants.iter().map(|plant| plant.what.as_str()).collect();
+    table + &format!("\nShared by all: {shared}. Faults that must be caught: {}.\n", plants.join("; "))
+}
+
 /// `page` with what stands between the markers of `name` replaced by `table`.
-fn with_table(page: &str, name: &str, table: &str) -> Option<String> {
-    let opening = format!("<!-- parameters:{name} -->\n");
+fn with_table(page: &str, kind: &str, name: &str, table: &str) -> Option<String> {
+    let (opening, closing) = (format!("<!-- {kind}:{name} -->\n"), format!("<!-- /{kind} -->"));
     let (before, rest) = page.split_once(&opening)?;
-    let (_, after) = rest.split_once("<!-- /parameters -->")?;
-    Some(format!("{before}{opening}{table}<!-- /parameters -->{after}"))
+    let (_, after) = rest.split_once(&closing)?;
+    Some(format!("{before}{opening}{table}{closing}{after}"))
 }
 
 #[test]
 fn parameter_tables_are_those_of_the_declarations() {
     let update = std::env::var_os("UPDATE_DOCS").is_some();
-    for (path, name, table) in tables() {
+    for (path, kind, name, table) in tables() {
         let page = read(&path);
-        let fresh = with_table(&page, name, &table)
-            .unwrap_or_else(|| panic!("{}: no <!-- parameters:{name} --> ... <!-- /parameters -->", path.display()));
+        let fresh = with_table(&page, kind, name, &table)
+            .unwrap_or_else(|| panic!("{}: no <!-- {kind}:{name} --> ... <!-- /{kind} -->", path.display()));
         if update {
             std::fs::write(&path, fresh).expect("a writable page");
         } else {
@@ -113,9 +132,9 @@ fn parameter_tables_are_those_of_the_declarations() {
 #[test]
 fn a_stale_table_is_seen() {
     let page = "a\n<!-- parameters:x -->\nold\n<!-- /parameters -->\nz\n";
-    let fresh = with_table(page, "x", "new\n").expect("markers");
+    let fresh = with_table(page, "parameters", "x", "new\n").expect("markers");
     assert_eq!(fresh, "a\n<!-- parameters:x -->\nnew\n<!-- /parameters -->\nz\n");
-    assert_eq!(with_table(page, "y", ""), None);
+    assert_eq!(with_table(page, "parameters", "y", ""), None);
 }
 
 #[test]

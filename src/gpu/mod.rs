@@ -2,6 +2,8 @@
 
 pub mod albedo_table;
 pub mod data_texture;
+#[cfg(not(target_arch = "wasm32"))]
+mod plant;
 pub mod readback;
 pub mod recorder;
 #[cfg(all(debug_assertions, not(target_arch = "wasm32")))]
@@ -48,6 +50,9 @@ pub struct Gpu {
     adapter: wgpu::AdapterInfo,
     failure: Arc<Mutex<Option<String>>>,
     pipelines: Arc<Mutex<HashMap<PipelineKey, Pipeline>>>,
+    /// Text of every shader that has a planted fault, by id.
+    #[cfg(not(target_arch = "wasm32"))]
+    planted: Arc<Mutex<HashMap<&'static str, String>>>,
     #[cfg(all(debug_assertions, not(target_arch = "wasm32")))]
     reloader: Arc<Mutex<Option<reload::Reloader>>>,
 }
@@ -128,6 +133,8 @@ impl Gpu {
             adapter: adapter.get_info(),
             failure,
             pipelines: Arc::default(),
+            #[cfg(not(target_arch = "wasm32"))]
+            planted: Arc::default(),
             #[cfg(all(debug_assertions, not(target_arch = "wasm32")))]
             reloader: Arc::new(Mutex::new(reload::Reloader::of_source_tree())),
         })
@@ -170,8 +177,14 @@ impl Gpu {
         self.pipelines.lock().is_ok_and(|pipelines| pipelines.contains_key(&pipeline_key(shader, features)))
     }
 
-    /// A pass's text: as edited while the program runs (native debug builds), or as built.
+    /// A pass's text: with a planted fault, as edited while the program runs (native debug builds), or as built.
     fn shader_source(&self, shader: &'static Shader) -> Cow<'static, str> {
+        #[cfg(not(target_arch = "wasm32"))]
+        if let Ok(planted) = self.planted.lock()
+            && let Some(text) = planted.get(shader.id)
+        {
+            return text.clone().into();
+        }
         #[cfg(all(debug_assertions, not(target_arch = "wasm32")))]
         if let Ok(reloader) = self.reloader.lock()
             && let Some(reloader) = reloader.as_ref()

@@ -2,7 +2,7 @@
 
 use super::PipelineKey;
 use super::shader::{Pipeline, Shader, table};
-use super::shader_source::{Flattened, flatten, reflect};
+use super::shader_source::flatten;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -41,7 +41,7 @@ impl Reloader {
         for shader in table::ALL {
             match flatten(&self.folder, shader.file) {
                 Ok(flattened) if flattened.text == self.source(shader) => {}
-                Ok(flattened) => match same_interface(shader, &flattened) {
+                Ok(flattened) => match shader.accepts(&flattened) {
                     Ok(()) => {
                         self.edited.insert(shader.id, flattened.text);
                         pipelines.retain(|(id, _), _| *id != shader.id);
@@ -57,22 +57,6 @@ impl Reloader {
     /// The text a shader's pipelines are made from: as edited, or as built.
     pub fn source<'a>(&'a self, shader: &'a Shader) -> &'a str {
         self.edited.get(shader.id).map_or(shader.source, String::as_str)
-    }
-}
-
-/// Whether an edited pass is valid and binds what the built one does, for that is what the program knows how to bind.
-fn same_interface(shader: &Shader, flattened: &Flattened) -> Result<(), String> {
-    let reflection = reflect(flattened)?;
-    let bindings = |name, group, index, kind| (name, group, index, kind);
-    let new = reflection.bindings.iter().map(|b| bindings(b.name.as_str(), b.group, b.index, b.kind));
-    let old = shader.bindings.iter().map(|b| bindings(b.name, b.group, b.index, b.kind));
-    let same = reflection.workgroup_size == shader.workgroup_size
-        && reflection.overrides.iter().eq(shader.overrides.iter())
-        && new.eq(old);
-    if same {
-        Ok(())
-    } else {
-        Err(format!("{}: bindings, overrides or workgroup size changed; rebuild the program", shader.file))
     }
 }
 

@@ -236,6 +236,27 @@ impl Shader {
         Pipeline { pipeline, groups }
     }
 
+    /// Whether an edited text of this pass is valid and binds what the built one does, for that is what the program knows
+    /// how to bind.
+    ///
+    /// # Errors
+    /// One line for a person.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(super) fn accepts(&self, edited: &super::shader_source::Flattened) -> std::result::Result<(), String> {
+        let reflection = super::shader_source::reflect(edited)?;
+        let bindings = |name, group, index, kind| (name, group, index, kind);
+        let new = reflection.bindings.iter().map(|b| bindings(b.name.as_str(), b.group, b.index, b.kind));
+        let old = self.bindings.iter().map(|b| bindings(b.name, b.group, b.index, b.kind));
+        let same = reflection.workgroup_size == self.workgroup_size
+            && reflection.overrides.iter().eq(self.overrides.iter())
+            && new.eq(old);
+        if same {
+            Ok(())
+        } else {
+            Err(format!("{}: bindings, overrides or workgroup size changed; rebuild the program", self.file))
+        }
+    }
+
     /// One bind group a group, every resource found by its name.
     ///
     /// # Errors

@@ -9,7 +9,7 @@ mod ris;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::recorder::Recorder;
-use crate::params::ParamSpec;
+use crate::params::{FilmParams, ParamSpec, Params, RenderParams};
 use crate::scene::gpu_types::Layout;
 use glam::UVec2;
 
@@ -36,6 +36,30 @@ pub struct TechniqueInfo {
     pub layouts: &'static [Layout],
     /// Makes one.
     pub create: fn(&Gpu) -> Box<dyn Technique>,
+}
+
+impl TechniqueInfo {
+    /// The declaration of a parameter: of the technique by its name, or of a global group as `render.NAME` or `film.NAME`.
+    ///
+    /// # Errors
+    /// `UNKNOWN_NAME` listing the names there are.
+    pub fn spec(&self, key: &str) -> Result<&'static ParamSpec> {
+        let (specs, name) = match key.split_once('.') {
+            Some(("render", name)) => (RenderParams::SPECS, name),
+            Some(("film", name)) => (FilmParams::SPECS, name),
+            _ => (self.params, key),
+        };
+        specs.iter().find(|spec| spec.name == name).ok_or_else(|| {
+            let own = self.params.iter().map(|s| s.name.to_owned());
+            let render = RenderParams::SPECS.iter().map(|s| format!("render.{}", s.name));
+            let film = FilmParams::SPECS.iter().map(|s| format!("film.{}", s.name));
+            Error::Unknown {
+                kind: "parameter",
+                name: key.to_owned(),
+                known: own.chain(render).chain(film).collect::<Vec<_>>().join(", "),
+            }
+        })
+    }
 }
 
 /// One rendering method. It owns its buffers and records its passes; it knows nothing of windows, pages or other methods.

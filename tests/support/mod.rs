@@ -3,11 +3,9 @@
 
 pub mod animated;
 pub mod bsdf;
-pub mod equivalence;
 pub mod extensions;
 pub mod gltf_writer;
 pub mod harness;
-pub mod plants;
 pub mod plate;
 pub mod statistics;
 pub mod twins;

@@ -3,6 +3,7 @@
 use crate::failure::Result;
 use crate::session::{Options, PassReport, Session};
 use crate::{bench_rays, progress, report};
+use restir::lab;
 
 /// Measure the GPU time of each pass and the rays a second.
 #[derive(clap::Args)]
@@ -79,7 +80,7 @@ pub fn run(args: &Args) -> Result<()> {
         adapter: &session.adapter,
         gpu_ms: passes.iter().map(|pass| pass.median_ms).sum(),
         passes,
-        frame_ms: report::median(&frame_ms),
+        frame_ms: lab::median(&frame_ms),
         rays_per_frame: rays / f64::from(args.frames),
         rays_per_second: 1e3 * rays / frame_ms.iter().sum::<f64>(),
     };

@@ -11,7 +11,7 @@ use restir::gpu::shader::{Shader, table};
 use restir::gpu_scene::GpuScene;
 use restir::scene::bvh::{self, Preset};
 use restir::scene::{Camera, FlatScene};
-use restir::{Gpu, GpuOptions};
+use restir::{Gpu, GpuOptions, lab};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -273,7 +273,7 @@ impl<'a> Bench<'a> {
             }
             seconds.push(sum);
         }
-        Ok(report::median(&seconds[1..]))
+        Ok(lab::median(&seconds[1..]))
     }
 
     fn trace(

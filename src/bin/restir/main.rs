@@ -6,6 +6,7 @@ mod compare;
 mod cook;
 mod failure;
 mod info;
+mod lab;
 mod options;
 mod progress;
 mod ray_sets;
@@ -15,6 +16,7 @@ mod scene;
 mod scenes;
 mod session;
 mod techniques;
+mod truth;
 
 use clap::{Parser, Subcommand};
 use failure::{Failure, Result};
@@ -39,6 +41,8 @@ enum Command {
     Info(info::Args),
     Cook(cook::Args),
     Bench(bench::Args),
+    Lab(lab::Args),
+    Truth(truth::Args),
 }
 
 fn run(command: Command) -> Result<()> {
@@ -50,6 +54,8 @@ fn run(command: Command) -> Result<()> {
         Command::Info(args) => info::run(&args),
         Command::Cook(args) => cook::run(&args),
         Command::Bench(args) => bench::run(&args),
+        Command::Lab(args) => lab::run(&args),
+        Command::Truth(args) => truth::run(&args),
     }
 }
 

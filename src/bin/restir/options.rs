@@ -2,8 +2,7 @@
 
 use glam::UVec2;
 use restir::output::MAX_SIDE;
-use restir::params::{FilmParams, Params, RenderParams};
-use restir::techniques::TechniqueInfo;
+use restir::params::{Params, RenderParams};
 use restir::{Error, Result};
 
 /// `WIDTHxHEIGHT` in pixels, each 1 to [`MAX_SIDE`].
@@ -20,16 +19,6 @@ pub fn assignment(text: &str) -> Result<(String, String)> {
         Some((key, value)) if !key.is_empty() => Ok((key.to_owned(), value.to_owned())),
         _ => Err(Error::bad_value("set", format!("'{text}' is not key=value"))),
     }
-}
-
-/// Checks the value of a `--set` whose key is known; what knows every key is the renderer, which is made later.
-pub fn check_value(technique: &TechniqueInfo, key: &str, value: &str) -> Result<()> {
-    let (specs, name) = match key.split_once('.') {
-        Some(("render", name)) => (RenderParams::SPECS, name),
-        Some(("film", name)) => (FilmParams::SPECS, name),
-        _ => (technique.params, key),
-    };
-    specs.iter().find(|spec| spec.name == name).map_or(Ok(()), |spec| spec.parse(value).map(|_| ()))
 }
 
 /// A value of `render.max_depth`.

@@ -26,15 +26,3 @@ pub fn warnings<'a>(warnings: impl IntoIterator<Item = &'a String>) {
         let _ = writeln!(std::io::stderr(), "warning: {warning}");
     }
 }
-
-/// The middle value (the mean of the two middle ones); zero for none.
-pub fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let middle = sorted.len() / 2;
-    match (sorted.get(middle), middle.checked_sub(1).and_then(|i| sorted.get(i))) {
-        (Some(high), Some(low)) if sorted.len().is_multiple_of(2) => 0.5 * (low + high),
-        (Some(middle), _) => *middle,
-        _ => 0.0,
-    }
-}

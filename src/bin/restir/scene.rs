@@ -8,7 +8,7 @@ use restir::scene::{Camera, FlatScene, Scene, builtin, environment, gltf, obj};
 use std::path::Path;
 
 /// What lights a scene beyond its own lights.
-#[derive(clap::Args)]
+#[derive(Default, clap::Args)]
 pub struct Lighting {
     /// What surrounds the scene, instead of its own: an environment map (equirectangular OpenEXR or Radiance .hdr, linear
     /// Rec. 709); `sky` or sky:elevation=40,azimuth=135,turbidity=2.5,albedo=0.3,intensity=5; or `white`.
@@ -20,7 +20,7 @@ pub struct Lighting {
 }
 
 /// What is loaded of a scene's file.
-#[derive(clap::Args)]
+#[derive(Default, clap::Args)]
 pub struct Choice {
     /// Index of the scene of a glTF file to load instead of its default (see `restir info`).
     #[arg(long, value_name = "N")]

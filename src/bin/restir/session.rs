@@ -5,7 +5,7 @@ use crate::{options, report, scene};
 use glam::UVec2;
 use pollster::block_on;
 use restir::scene::flat::SceneStats;
-use restir::{Gpu, GpuOptions, Renderer, techniques};
+use restir::{Gpu, GpuOptions, Renderer, lab, techniques};
 use std::time::Instant;
 
 /// The parameter that turns the environment, which is then something that moves.
@@ -80,7 +80,7 @@ impl Session {
         // A wrong name or value is told before long work.
         let technique = techniques::find(&options.technique).map_err(Failure::from_option)?;
         for (key, value) in &options.set {
-            options::check_value(technique, key, value).map_err(Failure::from_option)?;
+            technique.spec(key).and_then(|spec| spec.parse(value)).map_err(Failure::from_option)?;
         }
         let flat = scene::open(name, &options.choice, Some((&options.lighting, options.seed)))?;
         report::warnings(&flat.warnings);
@@ -153,7 +153,7 @@ impl Session {
     pub fn pass_reports(&self) -> Vec<PassReport> {
         let report = |pass: &Pass| PassReport {
             name: pass.name.clone(),
-            median_ms: report::median(&pass.frames),
+            median_ms: lab::median(&pass.frames),
             total_ms: pass.frames.iter().sum(),
         };
         self.passes.iter().map(report).collect()

@@ -122,11 +122,24 @@ pub fn make(name: &str) -> Result<Scene> {
         "glossy-spheres" => Ok(glossy_spheres::glossy_spheres()),
         "materials" => Ok(materials::materials()),
         "motion" => Ok(motion::motion()),
-        _ => Err(Error::Unknown {
-            kind: "built-in scene",
-            name: name.to_owned(),
-            known: ALL.iter().map(BuiltinInfo::form).collect::<Vec<_>>().join(", "),
-        }),
+        _ => Err(unknown(name)),
+    }
+}
+
+/// Whether there is a scene of this name, whatever number may follow its `:`.
+///
+/// # Errors
+/// [`Error::Unknown`].
+pub fn check_name(name: &str) -> Result<()> {
+    let stem = name.split(':').next().unwrap_or_default();
+    if ALL.iter().any(|scene| scene.name == stem) { Ok(()) } else { Err(unknown(name)) }
+}
+
+fn unknown(name: &str) -> Error {
+    Error::Unknown {
+        kind: "built-in scene",
+        name: name.to_owned(),
+        known: ALL.iter().map(BuiltinInfo::form).collect::<Vec<_>>().join(", "),
     }
 }
 

@@ -1,11 +1,15 @@
 //! Whether two renderers have the same expectation, by two one-sided tests on means over independent runs.
 
-use super::render;
-use restir::{Image, Renderer};
+use crate::error::Result;
+use crate::output::Image;
+use crate::renderer::Renderer;
+use pollster::block_on;
 use std::fmt;
 
 /// One-sided 95 % quantile of the normal distribution; runs are many enough.
 pub const Z_95: f64 = 1.645;
+/// Of the runs' seeds.
+const FIRST_SEED: u32 = 1000;
 
 /// Means over independent runs and their standard errors.
 #[derive(Debug, Clone)]
@@ -24,20 +28,26 @@ impl Estimate {
     }
 
     /// Of the mean radiance of the picture, then of each of its square tiles, `tile` pixels wide.
-    pub fn radiance(renderer: &mut Renderer, runs: u32, frames: u32, tile: u32) -> Self {
-        let samples: Vec<_> =
-            pictures(renderer, runs, frames).iter().map(|picture| region_means(picture, tile)).collect();
-        Self::of(&samples)
+    ///
+    /// # Errors
+    /// Those of rendering.
+    pub fn radiance(renderer: &mut Renderer, runs: u32, frames: u32, tile: u32) -> Result<Self> {
+        let pictures = pictures(renderer, runs, frames)?;
+        Ok(Self::of(&pictures.iter().map(|picture| region_means(picture, tile)).collect::<Vec<_>>()))
     }
 }
 
 /// The pictures of independent runs.
-pub fn pictures(renderer: &mut Renderer, runs: u32, frames: u32) -> Vec<Image> {
-    let run = |seed| {
-        renderer.set_seed(1000 + seed);
-        render(renderer, frames)
+///
+/// # Errors
+/// Those of rendering.
+pub fn pictures(renderer: &mut Renderer, runs: u32, frames: u32) -> Result<Vec<Image>> {
+    let mut run = |number| {
+        renderer.set_seed(FIRST_SEED + number);
+        (0..frames).try_for_each(|_| renderer.render_frame())?;
+        block_on(renderer.read_image())
     };
-    (0..runs).map(run).collect()
+    (0..runs).map(&mut run).collect()
 }
 
 /// Mean radiance of the picture, then of each tile.
@@ -63,7 +73,7 @@ pub struct Margins {
 }
 
 /// Relative difference of each region's mean from the reference's, its standard error, and its margin.
-#[derive(Debug)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Comparison(Vec<(f64, f64, f64)>);
 
 impl Comparison {
@@ -78,6 +88,11 @@ impl Comparison {
                 })
                 .collect(),
         )
+    }
+
+    /// Signed relative difference of the whole picture's mean, and its standard error.
+    pub fn bias(&self) -> (f64, f64) {
+        self.0.first().map_or((0.0, 0.0), |(difference, error, _)| (*difference, *error))
     }
 
     /// Whether every mean lies within its margin with 95 % confidence.

@@ -1,0 +1,203 @@
+//! One run of one point: what is measured, and where it is kept.
+
+use super::experiment::{Metric, Motion};
+use super::key;
+use super::metrics::{bias, mape, mse, relmse};
+use super::results::median;
+use super::settings::{self, Settings};
+use crate::error::{Error, Result};
+use crate::output::{Image, write_atomic};
+use crate::renderer::Renderer;
+use crate::scene::Camera;
+use pollster::block_on;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::time::Instant;
+
+/// Everything that determines the numbers of a run.
+#[derive(Debug, Clone)]
+pub struct Task<'a> {
+    /// Hash of the flat scene.
+    pub scene: &'a str,
+    /// Where the judged picture is seen from.
+    pub camera: &'a Camera,
+    /// What moves, if anything does.
+    pub motion: Option<&'a Motion>,
+    /// Picture size in pixels.
+    pub size: [u32; 2],
+    /// Technique id.
+    pub technique: &'a str,
+    /// Its settings that are not defaults.
+    pub settings: Settings,
+    /// Whether frames are averaged.
+    pub accumulate: bool,
+    /// Frames that are judged, rising, from 1.
+    pub frames: &'a [u32],
+    /// Of the random numbers.
+    pub seed: u32,
+}
+
+/// The numbers of one run, as they are kept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Run {
+    /// Median wall time of a frame from recording to its end, milliseconds.
+    pub frame_ms: f64,
+    /// Median time of the technique's passes in a frame, milliseconds; none where the device cannot time.
+    pub lighting_ms: Option<f64>,
+    /// One a judged frame.
+    pub readings: Vec<Reading>,
+}
+
+/// The picture after one frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Reading {
+    /// Counted from 1.
+    pub frame: u32,
+    /// [`super::mse`].
+    pub mse: f64,
+    /// [`super::relmse`].
+    pub relmse: f64,
+    /// [`super::mape`]; none where it is infinite.
+    pub mape: Option<f64>,
+    /// Relative difference of mean luminance; none for a black reference.
+    pub bias: Option<f64>,
+    /// Rays a pixel in this frame.
+    pub rays: f64,
+}
+
+impl Run {
+    /// A metric after a frame; none where it does not exist.
+    pub fn value(&self, metric: Metric, frame: u32) -> Option<f64> {
+        let reading = self.readings.iter().find(|reading| reading.frame == frame)?;
+        match metric {
+            Metric::Mse => Some(reading.mse),
+            Metric::Rmse => Some(reading.mse.sqrt()),
+            Metric::Relmse => Some(reading.relmse),
+            Metric::Mape => reading.mape,
+            Metric::Bias => reading.bias.map(|fraction| 100.0 * fraction),
+            Metric::FrameMs => Some(self.frame_ms),
+            Metric::LightingMs => self.lighting_ms,
+            Metric::Rays => Some(reading.rays),
+        }
+    }
+
+    /// A kept run, if there is one and it is whole.
+    pub fn read(path: &Path) -> Option<Self> {
+        serde_json::from_slice::<Kept>(&std::fs::read(path).ok()?).ok().map(|kept| kept.run)
+    }
+}
+
+/// A file of a kept run: the numbers, and for people what they are of.
+#[derive(Serialize, Deserialize)]
+struct Kept {
+    of: String,
+    run: Run,
+}
+
+impl Task<'_> {
+    /// What the numbers are of, in words that differ wherever the numbers may; but for the Rust code that records passes.
+    pub fn identity(&self, reference: &str, adapter: &str) -> String {
+        let shaders = key::shaders(|folder| !["tests", "bench"].contains(&folder));
+        let Task { scene, camera, motion, size, technique, settings, accumulate, frames, seed } = self;
+        let settings = settings::describe(settings);
+        format!(
+            "run 1|shaders {shaders}|scene {scene}|{camera:?}|{motion:?}|{size:?}|{technique}|{settings}|accumulate \
+             {accumulate}|frames {frames:?}|seed {seed}|reference {reference}|{adapter}"
+        )
+    }
+
+    /// Sets the renderer, of the task's scene, up for the first frame.
+    fn prepare(&self, renderer: &mut Renderer) -> Result<()> {
+        settings::apply(renderer, self.technique, &self.settings)?;
+        renderer.resize(self.size.into())?;
+        renderer.set_accumulate(self.accumulate);
+        let steps = f64::from(self.frames.last().copied().unwrap_or(1) - 1);
+        let (speed, time) = self.motion.map_or((0.0, 0.0), |motion| (motion.speed, motion.time));
+        renderer.set_speed(speed);
+        renderer.set_time(time - speed / 60.0 * steps);
+        renderer.set_camera(&self.camera_at(1));
+        renderer.set_seed(self.seed);
+        Ok(())
+    }
+
+    /// The camera of a frame: the last judged one has the scene's.
+    fn camera_at(&self, frame: u32) -> Camera {
+        let mut camera = self.camera.clone();
+        if let Some(motion) = self.motion {
+            let ahead = self.frames.last().copied().unwrap_or(1) as f32 - frame as f32;
+            camera.position -= glam::Vec3::from(motion.camera_step) * ahead;
+        }
+        camera
+    }
+
+    /// Compiles what the run needs, so that no measured frame waits for that.
+    ///
+    /// # Errors
+    /// Those of rendering.
+    pub fn warm_up(&self, renderer: &mut Renderer) -> Result<()> {
+        self.prepare(renderer)?;
+        for frame in 1..=2.min(self.frames.last().copied().unwrap_or(1)) {
+            if self.motion.is_some() {
+                renderer.set_camera(&self.camera_at(frame));
+            }
+            renderer.render_frame()?;
+        }
+        block_on(renderer.wait())
+    }
+
+    /// Renders and judges. Gives the numbers and the picture of the last frame.
+    ///
+    /// # Errors
+    /// Those of rendering; `BAD_VALUE` where a picture has values that are not finite.
+    pub fn measure(&self, renderer: &mut Renderer, reference: &Image) -> Result<(Run, Image)> {
+        self.prepare(renderer)?;
+        let pixels = f64::from(self.size[0]) * f64::from(self.size[1]);
+        let (mut frame_ms, mut lighting_ms) = (Vec::new(), Vec::new());
+        let mut readings = Vec::new();
+        let mut last = None;
+        for frame in 1..=self.frames.last().copied().unwrap_or(1) {
+            if self.motion.is_some() {
+                renderer.set_camera(&self.camera_at(frame));
+            }
+            let start = Instant::now();
+            renderer.render_frame()?;
+            block_on(renderer.wait())?;
+            frame_ms.push(1e3 * start.elapsed().as_secs_f64());
+            let times = block_on(renderer.pass_times())?;
+            if !times.is_empty() {
+                let own = times.iter().filter(|t| !t.name.starts_with("scene/") && !t.name.starts_with("film/"));
+                lighting_ms.push(own.map(|time| time.ms).sum());
+            }
+            if !self.frames.contains(&frame) {
+                continue;
+            }
+            let image = block_on(renderer.read_image())?;
+            let rays = block_on(renderer.counters())?.rays as f64 / pixels;
+            let mape = Some(mape(&image, reference)?).filter(|value| value.is_finite());
+            let [.., luminance] = bias(&image, reference)?;
+            readings.push(Reading {
+                frame,
+                mse: mse(&image, reference)?,
+                relmse: relmse(&image, reference)?,
+                mape,
+                bias: luminance.relative,
+                rays,
+            });
+            last = Some(image);
+        }
+        let last = last.ok_or_else(|| Error::bad_value("frames", "there is none to judge"))?;
+        let lighting_ms = if lighting_ms.is_empty() { None } else { Some(median(&lighting_ms)) };
+        Ok((Run { frame_ms: median(&frame_ms), lighting_ms, readings }, last))
+    }
+}
+
+/// Keeps a run.
+///
+/// # Errors
+/// `IO`.
+pub fn keep(path: &Path, identity: &str, run: &Run) -> Result<()> {
+    let kept = Kept { of: identity.to_owned(), run: run.clone() };
+    let text = serde_json::to_string_pretty(&kept)
+        .map_err(|error| Error::Io { path: path.display().to_string(), source: error.into() })?;
+    write_atomic(path, text.as_bytes())
+}

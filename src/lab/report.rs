@@ -1,0 +1,240 @@
+//! The files of an experiment: page, table, plots and strips. No dates: the same numbers give the same files.
+
+use super::experiment::{Axis, Experiment, Metric};
+use super::plot::{self, Curve, Plot};
+use super::results::{self, Mean, Point, Z_95_TWO_SIDED};
+use super::run::{Findings, Site};
+use super::{settings, strip};
+use crate::error::Result;
+use crate::output::write_atomic;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Writes them all into `folder`; gives their paths, the page first.
+pub(super) fn write(findings: &Findings, folder: &Path) -> Result<Vec<PathBuf>> {
+    let experiment = findings.experiment;
+    let mut files = vec![folder.join(format!("{}.md", findings.name))];
+    let table = folder.join(format!("{}.csv", findings.name));
+    write_atomic(&table, csv(findings).as_bytes())?;
+    files.push(table);
+    let mut page = head(findings);
+    for (index, site) in findings.sites.iter().enumerate() {
+        let points: Vec<&Point> = findings.points.iter().filter(|point| point.scene == index).collect();
+        let suffix = if findings.sites.len() == 1 { String::new() } else { format!("-{}", index + 1) };
+        let _ = write!(page, "\n## {}\n\n{}", site.name.replace('*', "N"), noise(site));
+        page += &markdown_table(experiment, &points);
+        for &metric in &experiment.metrics {
+            let Some(svg) = plot_of(experiment, site, &points, metric)? else { continue };
+            let file = format!("{}{suffix}-{}.svg", findings.name, metric.key());
+            write_atomic(&folder.join(&file), svg.as_bytes())?;
+            let _ = write!(page, "\n![{} in {}]({file})\n", metric.title(), site.name.replace('*', "N"));
+            files.push(folder.join(&file));
+        }
+        page += &equal_time_table(experiment, &points);
+        let file = format!("{}{suffix}.png", findings.name);
+        let tiles: Vec<PathBuf> = site.tiles.iter().map(|(_, path)| path.clone()).collect();
+        strip::write(&folder.join(&file), &tiles)?;
+        let _ = write!(page, "\n![Pictures]({file})\n\n{}\n", strip_legend(site));
+        files.push(folder.join(&file));
+    }
+    write_atomic(&files[0], page.as_bytes())?;
+    Ok(files)
+}
+
+fn head(findings: &Findings) -> String {
+    let experiment = findings.experiment;
+    let mut page = format!("# {}\n\nSource: {}.\n", experiment.title, experiment.source);
+    for text in [&experiment.about, &experiment.reading] {
+        if !text.trim().is_empty() {
+            let _ = write!(page, "\n{}\n", text.trim());
+        }
+    }
+    let [width, height] = experiment.size;
+    let _ = write!(page, "\n```sh\n{}\n```\n\n", findings.command);
+    let _ = write!(
+        page,
+        "{width} × {height} on {}. {} independent runs; ± is 1.96 standard errors of their mean. References: {} frames of \
+         `path-tracer` ({}).{}\n",
+        findings.adapter,
+        experiment.runs,
+        experiment.reference.frames,
+        settings::describe(&experiment.reference.settings),
+        if findings.software {
+            " Times are those of a software adapter on the CPU: only their ratios mean anything."
+        } else {
+            ""
+        },
+    );
+    page
+}
+
+fn noise(site: &Site) -> String {
+    let low = site.noise.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = site.noise.iter().copied().fold(0.0, f64::max);
+    let range = if low == high { figure(low) } else { format!("{} to {}", figure(low), figure(high)) };
+    format!("The reference's own MSE, which is in every MSE below: {range}.\n\n")
+}
+
+/// Four figures.
+fn figure(value: f64) -> String {
+    let size = value.abs();
+    if size == 0.0 {
+        "0".to_owned()
+    } else if (1e-3..1e5).contains(&size) {
+        let digits = (3 - size.log10().floor() as i32).max(0) as usize;
+        format!("{value:.digits$}")
+    } else {
+        format!("{value:.3e}")
+    }
+}
+
+fn with_error(mean: Option<Mean>) -> String {
+    match mean {
+        Some(Mean { mean, error: Some(error) }) => format!("{} ± {:.1e}", figure(mean), Z_95_TWO_SIDED * error),
+        Some(Mean { mean, error: None }) => figure(mean),
+        None => "–".to_owned(),
+    }
+}
+
+/// A table row for each point, and each judged frame where that is the axis.
+fn markdown_table(experiment: &Experiment, points: &[&Point]) -> String {
+    let by_frame = points.iter().any(|point| point.frames.len() > 1);
+    let titles: Vec<&str> = experiment.metrics.iter().map(|metric| metric.title()).collect();
+    let frame_head = if by_frame { " frame |" } else { "" };
+    let mut table = format!(
+        "| |{frame_head} {} |\n|---|{}\n",
+        titles.join(" | "),
+        "---|".repeat(titles.len() + usize::from(by_frame))
+    );
+    for point in points {
+        for &frame in &point.frames {
+            let cells: Vec<String> =
+                experiment.metrics.iter().map(|&metric| with_error(point.mean(metric, frame))).collect();
+            let frame = if by_frame { format!(" {frame} |") } else { String::new() };
+            let _ = writeln!(table, "| {} |{frame} {} |", point.label(experiment), cells.join(" | "));
+        }
+    }
+    table
+}
+
+/// Errors at equal time, for the experiment's first metric that is an error.
+fn equal_time_table(experiment: &Experiment, points: &[&Point]) -> String {
+    let Some(equal) = &experiment.equal_time else { return String::new() };
+    let Some(&metric) = experiment.metrics.iter().find(|metric| metric.is_error()) else { return String::new() };
+    let rows = results::equal_time(experiment, points, metric);
+    let mut table = format!(
+        "\nAt equal time: {0} beside that of '{1}' after as many milliseconds, between its frames by powers.\n\n\
+         | | frame | ms | {0} | {1} | ratio |\n|---|---|---|---|---|---|\n",
+        metric.title(),
+        equal.baseline
+    );
+    for row in rows {
+        let (baseline, ratio) = match row.baseline {
+            Some(baseline) => (figure(baseline), format!("{:.3}", row.error / baseline)),
+            None => ("not measured".to_owned(), "–".to_owned()),
+        };
+        let (time, error) = (figure(row.time), figure(row.error));
+        let _ = writeln!(table, "| {} | {} | {time} | {error} | {baseline} | {ratio} |", row.label, row.frame);
+    }
+    table
+}
+
+fn strip_legend(site: &Site) -> String {
+    let labels = site.tiles.chunks(strip::columns(site.tiles.len()));
+    let rows: Vec<String> =
+        labels.map(|row| row.iter().map(|(label, _)| label.as_str()).collect::<Vec<_>>().join(" | ")).collect();
+    format!("From the left, row by row, the first run's last frame: {}.", rows.join(" // "))
+}
+
+/// A plot of one metric; none where no point has it.
+fn plot_of(experiment: &Experiment, site: &Site, points: &[&Point], metric: Metric) -> Result<Option<String>> {
+    let axis = experiment.axis();
+    let half = |mean: Mean| Z_95_TWO_SIDED * mean.error.unwrap_or(0.0);
+    let sweep = experiment.sweeps.first();
+    let numeric = points.iter().all(|p| results::abscissa(axis, p, p.last_frame()).is_some());
+    let mut curves: Vec<Curve> = Vec::new();
+    let mut categories: Option<Vec<String>> = (!numeric).then(Vec::new);
+    for point in points {
+        let frames =
+            if matches!(axis, Axis::Frame | Axis::Time) { point.frames.clone() } else { vec![point.last_frame()] };
+        // Along frames and time every point is a curve; along a sweep those of one series are; side by side all are one.
+        let name = match axis {
+            Axis::Frame | Axis::Time => point.label(experiment),
+            Axis::Sweep => point.series.clone(),
+            Axis::Series => String::new(),
+        };
+        let index = curves.iter().position(|curve| curve.name == name).unwrap_or_else(|| {
+            curves.push(Curve { name, points: Vec::new() });
+            curves.len() - 1
+        });
+        for frame in frames {
+            let Some(mean) = point.mean(metric, frame) else { continue };
+            let x = match &mut categories {
+                None => results::abscissa(axis, point, frame).unwrap_or(0.0),
+                Some(names) => {
+                    let name = if axis == Axis::Series {
+                        point.label(experiment)
+                    } else {
+                        point.value.clone().unwrap_or_default()
+                    };
+                    let known = names.iter().position(|known| *known == name);
+                    known.unwrap_or_else(|| {
+                        names.push(name);
+                        names.len() - 1
+                    }) as f64
+                }
+            };
+            curves[index].points.push((x, mean.mean, half(mean)));
+        }
+    }
+    curves.retain(|curve| !curve.points.is_empty());
+    if curves.is_empty() {
+        return Ok(None);
+    }
+    let x = match axis {
+        Axis::Sweep => sweep.map_or("", |sweep| sweep.key.as_str()),
+        Axis::Frame => "frames",
+        Axis::Time => "milliseconds",
+        Axis::Series => "",
+    };
+    plot::svg(&Plot {
+        title: &site.name.replace('*', "N"),
+        x,
+        y: metric.title(),
+        categories,
+        may_be_logarithmic: metric != Metric::Bias,
+        curves,
+    })
+    .map(Some)
+}
+
+/// Every metric of every point, a row for each judged frame.
+fn csv(findings: &Findings) -> String {
+    let experiment = findings.experiment;
+    let mut text = "scene,series,value,frame,runs,picture_ms".to_owned();
+    for metric in Metric::ALL {
+        let name = metric.key().replace('-', "_");
+        let _ = write!(text, ",{name},{name}_standard_error");
+    }
+    text.push('\n');
+    for point in &findings.points {
+        for &frame in &point.frames {
+            let scene = quoted(&experiment.scenes[point.scene].name);
+            let value = quoted(point.value.as_deref().unwrap_or_default());
+            let (series, runs, time) = (quoted(&point.series), point.runs.len(), point.time(frame));
+            let _ = write!(text, "{scene},{series},{value},{frame},{runs},{time}");
+            for metric in Metric::ALL {
+                let mean = point.mean(metric, frame);
+                let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:e}"));
+                let _ = write!(text, ",{},{}", number(mean.map(|m| m.mean)), number(mean.and_then(|m| m.error)));
+            }
+            text.push('\n');
+        }
+    }
+    text
+}
+
+/// A CSV field (RFC 4180).
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
