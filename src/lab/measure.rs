@@ -191,13 +191,13 @@ impl Task<'_> {
     }
 }
 
-/// Keeps a run.
+/// Keeps a run. Gives it as [`Run::read`] will: JSON may change a number's last bit.
 ///
 /// # Errors
 /// `IO`.
-pub fn keep(path: &Path, identity: &str, run: &Run) -> Result<()> {
-    let kept = Kept { of: identity.to_owned(), run: run.clone() };
-    let text = serde_json::to_string_pretty(&kept)
-        .map_err(|error| Error::Io { path: path.display().to_string(), source: error.into() })?;
-    write_atomic(path, text.as_bytes())
+pub fn keep(path: &Path, identity: &str, run: Run) -> Result<Run> {
+    let io = |error: serde_json::Error| Error::Io { path: path.display().to_string(), source: error.into() };
+    let text = serde_json::to_string_pretty(&Kept { of: identity.to_owned(), run }).map_err(io)?;
+    write_atomic(path, text.as_bytes())?;
+    serde_json::from_str::<Kept>(&text).map(|kept| kept.run).map_err(io)
 }

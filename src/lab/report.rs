@@ -148,7 +148,11 @@ fn strip_legend(site: &Site) -> String {
 
 /// A plot of one metric; none where no point has it.
 fn plot_of(experiment: &Experiment, site: &Site, points: &[&Point], metric: Metric) -> Result<Option<String>> {
-    let axis = experiment.axis();
+    // What a frame takes is one number a run, however many of its frames are judged.
+    let axis = match (experiment.axis(), metric) {
+        (Axis::Frame | Axis::Time, Metric::FrameMs | Metric::LightingMs) => Axis::Series,
+        (axis, _) => axis,
+    };
     let half = |mean: Mean| Z_95_TWO_SIDED * mean.error.unwrap_or(0.0);
     let sweep = experiment.sweeps.first();
     let numeric = points.iter().all(|p| results::abscissa(axis, p, p.last_frame()).is_some());

@@ -224,9 +224,8 @@ impl Lab<'_> {
                         if number == 0 {
                             write_tile(&tile, &picture, exposure)?;
                         }
-                        keep(&numbers, &identity, &run)?;
                         self.outcome.measured += 1;
-                        run
+                        keep(&numbers, &identity, run)?
                     }
                 };
                 if number == 0 {

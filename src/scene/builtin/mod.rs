@@ -1,6 +1,8 @@
 //! Procedural, seeded scenes.
 
+mod arcade;
 mod area_lights;
+mod city;
 mod cornell;
 mod furnace;
 mod glossy_spheres;
@@ -8,11 +10,13 @@ mod hall;
 mod many_lights;
 mod materials;
 mod motion;
+mod torches;
 mod veach_mis;
 
 use super::{Instance, Material, Mesh, Scene, shapes};
 use crate::error::{Error, Result};
 use glam::{Mat4, Vec3};
+use std::ops::RangeInclusive;
 
 /// One built-in scene, for menus and `restir scenes`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,6 +77,24 @@ pub const ALL: &[BuiltinInfo] = &[
         example: "hall:50000",
     },
     BuiltinInfo {
+        name: "arcade",
+        title: "Arcade with strings of lamps",
+        doc: "Two rows of arches and stalls at night under N small lamps on strings (10 to 200,000) that together always give about the same light.",
+        example: "arcade:400",
+    },
+    BuiltinInfo {
+        name: "city",
+        title: "City at night",
+        doc: "Blocks of houses with N lit windows (10 to 5,000), and street lamps.",
+        example: "city:800",
+    },
+    BuiltinInfo {
+        name: "torches",
+        title: "Maze of torches",
+        doc: "A maze of rooms, N torches (9 to 40,000), one a room, each seen by few others.",
+        example: "torches:300",
+    },
+    BuiltinInfo {
         name: "glossy-spheres",
         title: "Glossy spheres",
         doc: "Spheres from smooth to rough and from plastic to metal, under three panels and a dim sky.",
@@ -109,6 +131,19 @@ pub fn make(name: &str) -> Result<Scene> {
     if let Some(count) = name.strip_prefix("hall:") {
         return hall::hall(count);
     }
+    let numbered: [(&str, fn(&str) -> Result<Scene>); 3] =
+        [("arcade", arcade::arcade), ("city", city::city), ("torches", torches::torches)];
+    for (stem, make) in numbered {
+        if name == stem {
+            return Err(Error::bad_value(
+                format!("{stem}:N"),
+                "the number of lights is missing, as in ".to_owned() + stem + ":400",
+            ));
+        }
+        if let Some(count) = name.strip_prefix(stem).and_then(|rest| rest.strip_prefix(':')) {
+            return make(count);
+        }
+    }
     match name {
         "cornell" => Ok(cornell::cornell()),
         "cornell-64" => Ok(cornell::cornell_64()),
@@ -141,6 +176,14 @@ fn unknown(name: &str) -> Error {
         name: name.to_owned(),
         known: ALL.iter().map(BuiltinInfo::form).collect::<Vec<_>>().join(", "),
     }
+}
+
+/// A whole number of a scene's name, within what the scene takes.
+fn count(form: &str, text: &str, range: RangeInclusive<u32>) -> Result<u32> {
+    text.parse().ok().filter(|n| range.contains(n)).ok_or_else(|| {
+        let [low, high] = [range.start(), range.end()];
+        Error::bad_value(form, format!("'{text}' is not a whole number from {low} to {high}"))
+    })
 }
 
 /// The list as JSON: name, title, doc, example.
