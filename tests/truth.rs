@@ -77,6 +77,20 @@ fn restir_di_equals_the_path_tracer() {
         &[("reuse_weights", "pairwise")],
         &[("reuse_weights", "pairwise"), ("visibility_in_weights", "no"), ("visibility_reuse", "no")],
         &[("reuse_weights", "defensive")],
+        // Every choice of candidates and neighbours at once.
+        &[
+            ("bsdf_samples", "1"),
+            ("light_choice", "uniform"),
+            ("temporal_permutation", "yes"),
+            ("disocclusion_neighbors", "4"),
+            ("spatial_retries", "3"),
+            ("spatial_pattern", "low-discrepancy"),
+            ("spatial_material_threshold", "0.2"),
+            ("spatial_cap", "2"),
+            ("reuse_weights", "defensive"),
+            ("reservoir_format", "packed"),
+            ("pixel_order", "tiles-4"),
+        ],
     ];
     for settings in unbiased {
         let comparison = compare(&format!("unbiased {settings:?}"), &mut restir(&gpu, settings), RUNS);
@@ -100,6 +114,8 @@ fn planted_biases_are_caught() {
         let comparison = compare(&format!("biased {settings:?}"), &mut restir(&gpu, &settings), RUNS / 4);
         assert!(comparison.is_caught(), "{settings:?} went unnoticed");
     }
+    let comparison = compare("boiling_filter", &mut restir(&gpu, &[("boiling_filter", "0.5")]), RUNS / 4);
+    assert!(comparison.is_caught(), "the boiling filter went unnoticed");
     // Each: what, with which weights, the file, what stands there, what is put in its place.
     let plants = [
         (
@@ -141,8 +157,8 @@ fn planted_biases_are_caught() {
             "the candidate count left out of the initial weights' mean",
             "balance",
             "techniques/common/resampling.wgsl",
-            "(pdf * f32(candidate_count))",
-            "(pdf * f32(candidate_count - 1u))",
+            "f32(light_samples) *",
+            "f32(light_samples - 1u) *",
         ),
     ];
     for (what, weights, file, old, new) in plants {
