@@ -133,7 +133,7 @@ fn passes_stay_valid_for_every_scene() {
         check(shader, &|_| false);
     }
     // Every feature is in these.
-    for shader in [&table::RESTIR_DI_TEMPORAL, &table::PATH_TRACER_TRACE] {
+    for shader in [&table::RESTIR_DI_INITIAL, &table::RESTIR_DI_TEMPORAL, &table::PATH_TRACER_TRACE] {
         for feature in shader.overrides {
             check(shader, &|name| name == *feature);
             check(shader, &|name| name != *feature);
@@ -230,6 +230,8 @@ fn enumeration(prefix: &str) -> BTreeMap<String, usize> {
 #[test]
 fn shaders_number_choices_as_declared() {
     let choices = [
+        ("SPATIAL_PATTERN_", restir_di, "spatial_pattern"),
+        ("PIXEL_ORDER_", restir_di, "pixel_order"),
         ("TONE_MAP_", FilmParams::SPECS, "tone_map"),
         ("MIS_", RenderParams::SPECS, "mis_heuristic"),
         ("PIXEL_FILTER_", RenderParams::SPECS, "pixel_filter"),

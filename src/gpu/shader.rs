@@ -151,6 +151,14 @@ scene_features! {
         energy_compensation,
         /// `render.conserving_mix`.
         conserving_mix,
+        /// Lights chosen by search in the cumulative distribution (src/techniques/candidates.rs).
+        light_choice_cdf,
+        /// Lights chosen all alike.
+        light_choice_uniform,
+        /// Candidates drawn for the BSDF.
+        bsdf_candidates,
+        /// Reservoirs in three words instead of four.
+        reservoirs_packed,
         /// Reuse weights 1/M (src/techniques/reuse.rs).
         reuse_constant,
         /// Joining reservoirs of all neighbours, however different.

@@ -1,5 +1,6 @@
 //! Rendering methods and their registry. To add one: its shader folder, its file here, one line in [`ALL`], one docs page.
 
+pub mod candidates;
 mod normals;
 mod path_tracer;
 mod restir_di;
