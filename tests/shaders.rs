@@ -4,7 +4,7 @@
 mod support;
 
 use glam::UVec2;
-use restir::Error;
+use restir::{Error, techniques};
 use restir::gpu::recorder::Recorder;
 use restir::gpu::shader::{SceneFeatures, Shader, table};
 use restir::gpu::shader_source::{Flattened, flatten, reflect};
@@ -229,6 +229,7 @@ fn enumeration(prefix: &str) -> BTreeMap<String, usize> {
 /// A uniform holds the index of a choice, so shaders must count choices as they are declared.
 #[test]
 fn shaders_number_choices_as_declared() {
+    let restir_di = techniques::find("restir-di").expect("a technique").params;
     let choices = [
         ("SPATIAL_PATTERN_", restir_di, "spatial_pattern"),
         ("PIXEL_ORDER_", restir_di, "pixel_order"),
