@@ -116,7 +116,7 @@ mod tests {
             let scene = torches(number).unwrap();
             let lit =
                 scene.meshes.iter().find(|m| scene.materials[m.material as usize].emissive != Vec3::ZERO).unwrap();
-            assert_eq!(lit.indices.len() / 36, number.parse().unwrap());
+            assert_eq!(lit.indices.len() / 36, number.parse::<usize>().unwrap());
             let half = 0.5 * sides as f32 * ROOM;
             assert!(lit.positions.iter().all(|p| p.x.abs() < half && p.z.abs() < half && p.y < WALL));
         }
