@@ -50,8 +50,8 @@ pub fn pictures(renderer: &mut Renderer, runs: u32, frames: u32) -> Result<Vec<I
     (0..runs).map(&mut run).collect()
 }
 
-/// Mean radiance of the picture, then of each tile.
-fn region_means(image: &Image, tile: u32) -> Vec<f64> {
+/// Mean radiance of the picture, then of each of its square tiles, `tile` pixels wide.
+pub fn region_means(image: &Image, tile: u32) -> Vec<f64> {
     let columns = image.width / tile;
     let mut sums = vec![0.0; 1 + (columns * (image.height / tile)) as usize];
     for (i, pixel) in image.pixels.iter().enumerate() {
