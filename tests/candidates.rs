@@ -78,7 +78,7 @@ fn every_choice_of_candidates_equals_the_path_tracer() {
 
 #[test]
 fn planted_faults_of_candidates_are_caught() {
-    // Each: what, with which light choice, what stands there, what is put in its place.
+    // Each: what, with which light choice, what stands in a shader, what is put in its place.
     for (what, choice, old, new) in [
         ("rays weighed as if only lights were sampled", "alias", "density += f32(bsdf_samples) *", "density += 0.0 *"),
         (
@@ -87,7 +87,7 @@ fn planted_faults_of_candidates_are_caught() {
             "return pdf / light.solid_angle_jacobian;",
             "return pdf;",
         ),
-        ("a light's part of the distribution taken for its neighbour's", "cdf", "return first;", "return first / 2u;"),
+        ("a light's part of the distribution taken for another's", "cdf", "return first;", "return first / 2u;"),
         ("lights drawn alike with the density of power", "uniform", "return 1.0 / f32(frame.light_count);", ""),
     ] {
         let gpu = fresh_gpu();

@@ -80,8 +80,8 @@ crate::params! {
         reservoir_format: choice(0, ["f32", "packed"]),
         /// In which order pixels lie in memory: by rows, by columns, or in tiles of 2 to 40 pixels a side. The same picture; which is fastest depends on the device.
         pixel_order: choice(0, ["rows", "columns", "tiles-2", "tiles-4", "tiles-8", "tiles-16", "tiles-40"]),
-        /// How joined reservoirs are weighted. constant (1/M, every neighbour) and heuristics (1/M, after rejection by depth, normal and material) are biased whatever else is set and trace no rays; 1/z divides by the confidence of pixels that could have made the sample, balance weighs them by how likely they were to, pairwise each neighbour against the pixel alone, defensive likewise with a share kept for the pixel's own sample: unbiased with visibility_in_weights, or without visibility_reuse. Time goes with the square of neighbours for 1/z and balance, with their number for pairwise and defensive.
-        reuse_weights: choice(3, crate::techniques::reuse::WEIGHTS),
+        /// How joined reservoirs are weighted. constant (1/M, every neighbour) and heuristics (1/M, after rejection by depth, normal and material) are biased whatever else is set and trace no rays; 1/z divides by the confidence of pixels that could have made the sample, balance weighs them by how likely they were to, pairwise each neighbour against the pixel alone, defensive likewise with a share kept for the pixel's own sample (of neighbours; history is joined pairwise): unbiased with visibility_in_weights, or without visibility_reuse. Time goes with the square of neighbours for 1/z and balance, with their number for pairwise and defensive.
+        reuse_weights: choice(5, crate::techniques::reuse::WEIGHTS),
         /// Trace shadow rays for reuse weights, in vain for constant and heuristics. Of k joined reservoirs, at most k(k - 1) rays for 1/z and balance and 2(k - 1) for pairwise and defensive; without visibility_reuse k more. On: unbiased. Off: faster, and too dark at the edges of shadows while visibility_reuse is on.
         visibility_in_weights: flag(true),
         /// Add indirect light from the path tracer's later bounces. Off: direct light only, faster, and darker than the truth.
@@ -230,6 +230,10 @@ impl Technique for RestirDi {
         recorder.features = features;
         // Without a history the pass would only copy; and the first picture need not wait for its pipeline.
         if self.params.temporal_reuse == 1 && buffers.has_history {
+            // Of two reservoirs pairwise weights are the balance heuristic; a share kept for the newer one would only make the
+            // history shorter.
+            let features = recorder.features;
+            recorder.features.reuse_defensive = false;
             recorder
                 .pass(&table::RESTIR_DI_TEMPORAL)
                 .bind("params", &self.uniform)
@@ -237,6 +241,7 @@ impl Technique for RestirDi {
                 .bind("reservoirs_previous", &reservoirs[history])
                 .bind("reservoirs_out", &reservoirs[spare])
                 .dispatch_over(size)?;
+            recorder.features = features;
             std::mem::swap(&mut current, &mut spare);
         }
         if self.params.boiling_filter > 0.0 {
