@@ -15,8 +15,6 @@ pub struct ReportReservoir {
     pub point: u32,
     /// Target function of the sample at the pixel that holds it.
     pub desired_pdf: f32,
-    /// Sum of the weights of everything offered.
-    pub weight_sum: f32,
     /// W.
     pub unbiased_contribution_weight: f32,
     /// c, counted in proposals.

@@ -25,8 +25,12 @@ impl Estimate {
 
     /// Of the mean radiance of the picture, then of each of its square tiles, `tile` pixels wide.
     pub fn radiance(renderer: &mut Renderer, runs: u32, frames: u32, tile: u32) -> Self {
-        let samples: Vec<_> =
-            pictures(renderer, runs, frames).iter().map(|picture| region_means(picture, tile)).collect();
+        Self::of_pictures(&pictures(renderer, runs, frames), tile)
+    }
+
+    /// The same of the pictures of independent runs.
+    pub fn of_pictures(pictures: &[Image], tile: u32) -> Self {
+        let samples: Vec<_> = pictures.iter().map(|picture| region_means(picture, tile)).collect();
         Self::of(&samples)
     }
 }

@@ -1,6 +1,7 @@
-// The report's reservoir (report 003, section 4.1): a sample, its desired pdf, the accumulated weight sum, the final weight
-// and the number of samples seen. In the terms of docs/conventions.md the desired pdf is the target function p-hat, the
-// final weight is W, and the number of samples, counted in proposals, is the confidence weight c.
+// The report's reservoir (report 003, section 4.1): a sample, its desired pdf, the final weight and the number of samples
+// seen; the accumulated weight sum is the product of the last three. In the terms of docs/conventions.md the desired pdf is
+// the target function p-hat, the final weight is W, and the number of samples, counted in proposals, is the confidence
+// weight c.
 #include "techniques/common/resampling.wgsl"
 #include "techniques/restir-report/params.wgsl"
 
@@ -8,8 +9,7 @@ struct ReportReservoir {
     light: u32,
     point: u32,
     desired_pdf: f32, // p-hat of the sample at the pixel that holds it
-    weight_sum: f32,
-    unbiased_contribution_weight: f32, // W = weight_sum / (desired_pdf * samples_count)
+    unbiased_contribution_weight: f32, // W = WeightSum / (Pdf * SamplesCount)
     samples_count: f32,
 }
 
@@ -24,7 +24,7 @@ fn reservoir_index(pixel: vec2u, strategy: u32) -> u32 {
 }
 
 fn report_reservoir_empty() -> ReportReservoir {
-    return ReportReservoir(NONE, 0u, 0.0, 0.0, 0.0, 0.0);
+    return ReportReservoir(NONE, 0u, 0.0, 0.0, 0.0);
 }
 
 fn report_sample(reservoir: ReportReservoir) -> LightSample {
@@ -39,6 +39,5 @@ fn finish_reservoir(stream: Stream, desired_pdf: f32, samples_count: f32) -> Rep
         let mean = Stream(stream.selected, stream.weight_sum / max(samples_count, 1e-30), samples_count);
         weight = stream_contribution_weight(mean, desired_pdf);
     }
-    return ReportReservoir(stream.selected.light, stream.selected.point, desired_pdf, stream.weight_sum, weight,
-        samples_count);
+    return ReportReservoir(stream.selected.light, stream.selected.point, desired_pdf, weight, samples_count);
 }
