@@ -114,28 +114,23 @@ fn faults_are_caught() {
     }
 }
 
-/// On rough walls neighbours that pass the checks have nearly the same target function, and the faults that trust in that are
-/// hardly biased. On polished metal they are not alike.
+/// On rough walls neighbours that pass the checks have nearly the same target function, and a merge that does not evaluate it
+/// again is hardly biased. On polished metal they have not.
 #[test]
-fn on_polished_metal_checks_hide_no_fault() {
+fn on_polished_metal_checks_do_not_hide_the_target() {
     let mut scene = scene();
     for material in &mut scene.materials {
         (material.metallic, material.roughness) = (1.0, 0.4);
     }
     let flat = flatten(&scene);
-    let reference = Estimate::radiance(&mut path_tracer(flat.clone()), 16, 256, TILE);
-    for (faults, configuration, runs) in [
-        (&[][..], "d-spatial", RUNS),
-        (&[], "e-both", RUNS),
-        (&[TARGET], "d-spatial", RUNS / 2),
-        (&[TARGET], "e-both", RUNS / 2),
-        (&[COUNT_WEIGHTS], "d-spatial", RUNS / 2),
-        (&[COUNT_WEIGHTS], "e-both", RUNS / 2),
-    ] {
-        let mut renderer = report(flat.clone(), &with_faults(configuration, faults));
-        let estimate = Estimate::radiance(&mut renderer, runs, FRAMES, TILE);
-        let comparison = Comparison::new(&estimate, &reference, MARGINS);
-        println!("{faults:?}, {configuration}, polished: {comparison}");
+    // Highlights are noise: the mean over the picture alone, and less sharply than elsewhere.
+    let margins = Margins { picture: 0.004, tile: 0.004 };
+    let reference = Estimate::radiance(&mut path_tracer(flat.clone()), 16, 256, SIZE);
+    for (faults, runs) in [(&[][..], RUNS), (&[TARGET], RUNS / 2)] {
+        let mut renderer = report(flat.clone(), &with_faults("e-both", faults));
+        let comparison = Comparison::new(&Estimate::radiance(&mut renderer, runs, FRAMES, SIZE), &reference, margins);
+        println!("{faults:?}, e-both, polished: {comparison}");
+        assert!(if faults.is_empty() { comparison.is_equivalent() } else { comparison.is_caught() }, "{faults:?}");
     }
 }
 

@@ -229,9 +229,10 @@ fn enumeration(prefix: &str) -> BTreeMap<String, usize> {
 /// A uniform holds the index of a choice, so shaders must count choices as they are declared.
 #[test]
 fn shaders_number_choices_as_declared() {
-    let restir_di = techniques::find("restir-di").expect("a technique").params;
+    let params = |id| techniques::find(id).expect("a technique").params;
     let choices = [
-        ("BIAS_CORRECTION_", restir_di, "bias_correction"),
+        ("BIAS_CORRECTION_", params("restir-di"), "bias_correction"),
+        ("CONFIGURATION_", params("restir-report"), "configuration"),
         ("TONE_MAP_", FilmParams::SPECS, "tone_map"),
         ("MIS_", RenderParams::SPECS, "mis_heuristic"),
         ("PIXEL_FILTER_", RenderParams::SPECS, "pixel_filter"),
