@@ -33,11 +33,11 @@ crate::params! {
         history_cap: float(20.0, 0.0..=1000.0, "frames"),
         /// How far away the one neighbour lies at most. Higher: more different samples, less alike surfaces. Unbiased at any value.
         spatial_radius: float(0.03, 0.0..=1.0, "of height"),
-        /// Fault: SamplesCount grows by one for a merged reservoir, whose weight stands for all that it has seen. Biased: the whole picture is too bright, and with e-both brighter every frame.
+        /// Fault: SamplesCount grows by one for a merged reservoir, whose weight stands for all that it has seen. Biased: the whole picture is too bright, and with temporal reuse brighter every frame.
         fault_sample_count: flag(false),
-        /// Fault: a merged reservoir's weight is that of its own pixel, while the final weight divides by the desired pdf at this one. Biased: light leaks across edges and corners.
+        /// Fault: a merged reservoir's weight is that of its own pixel, while the final weight divides by the desired pdf at this one. Biased: too bright on the whole, and light leaks across edges and corners; least where neighbours must be similar.
         fault_target_not_reevaluated: flag(false),
-        /// Fault: merged reservoirs are weighted by their counts alone, also where the other could not have made the sample. Biased: too dark at edges and corners, and all the more with the two faults that follow.
+        /// Fault: merged reservoirs are weighted by their counts alone, also where the other could not have made the sample. Biased: too dark at edges and corners, with the two faults that follow, for their checks hide it.
         fault_count_weights: flag(false),
         /// Fault: the history is that of the same pixel, whatever it saw. Alone it adds noise when the camera moves, and no bias; with fault_count_weights it is biased.
         fault_no_reprojection: flag(false),
