@@ -3,6 +3,7 @@
 mod normals;
 mod path_tracer;
 mod restir_di;
+mod restir_di_decoupled;
 mod ris;
 
 use crate::error::{Error, Result};
@@ -66,7 +67,7 @@ pub trait Technique {
 }
 
 /// Every technique, in the order of menus.
-pub static ALL: &[&TechniqueInfo] = &[&restir_di::INFO, &ris::INFO, &path_tracer::INFO, &normals::INFO];
+pub static ALL: &[&TechniqueInfo] = &[&restir_di::INFO, &restir_di_decoupled::INFO, &ris::INFO, &path_tracer::INFO, &normals::INFO];
 
 /// The technique with this id.
 ///
