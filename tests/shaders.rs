@@ -230,8 +230,11 @@ fn enumeration(prefix: &str) -> BTreeMap<String, usize> {
 #[test]
 fn shaders_number_choices_as_declared() {
     let restir_di = techniques::find("restir-di").expect("a technique").params;
+    let decoupled = techniques::find("restir-di-decoupled").expect("a technique").params;
     let choices = [
         ("BIAS_CORRECTION_", restir_di, "bias_correction"),
+        ("REUSE_WEIGHT_", decoupled, "bias_correction"),
+        ("VISIBILITY_", decoupled, "visibility"),
         ("TONE_MAP_", FilmParams::SPECS, "tone_map"),
         ("MIS_", RenderParams::SPECS, "mis_heuristic"),
         ("PIXEL_FILTER_", RenderParams::SPECS, "pixel_filter"),

@@ -67,7 +67,8 @@ pub trait Technique {
 }
 
 /// Every technique, in the order of menus.
-pub static ALL: &[&TechniqueInfo] = &[&restir_di::INFO, &restir_di_decoupled::INFO, &ris::INFO, &path_tracer::INFO, &normals::INFO];
+pub static ALL: &[&TechniqueInfo] =
+    &[&restir_di::INFO, &restir_di_decoupled::INFO, &ris::INFO, &path_tracer::INFO, &normals::INFO];
 
 /// The technique with this id.
 ///

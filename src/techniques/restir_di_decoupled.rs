@@ -192,7 +192,10 @@ impl Technique for RestirDiDecoupled {
             gpu.storage(&format!("restir-di-decoupled {what} at {}x{}", size.x, size.y), pixels * bytes as u64)
         };
         let of_tiles = |what: &str, bytes: usize| {
-            gpu.storage(&format!("restir-di-decoupled {what} (tile_subsets x tile_lights)"), tile_light_count * bytes as u64)
+            gpu.storage(
+                &format!("restir-di-decoupled {what} (tile_subsets x tile_lights)"),
+                tile_light_count * bytes as u64,
+            )
         };
         self.buffers = Some(Buffers {
             size,

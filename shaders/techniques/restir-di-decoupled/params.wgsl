@@ -32,9 +32,9 @@ const VISIBILITY_KEEP = 4u; // (e) all three, for both; a shadowed reservoir kee
 const VISIBILITY_DECOUPLED = 5u; // (f) the candidate for both, the others, reused where that will do, for shading
 const VISIBILITY_MIS = 6u; // every sample in every domain, for shading, resampling and its weights
 
-const BIAS_CORRECTION_NONE = 0u;
-const BIAS_CORRECTION_Z = 1u;
-const BIAS_CORRECTION_MIS = 2u;
+const REUSE_WEIGHT_NONE = 0u;
+const REUSE_WEIGHT_Z = 1u;
+const REUSE_WEIGHT_MIS = 2u;
 
 @group(1) @binding(3) var<uniform> params: RestirDiDecoupledParams;
 

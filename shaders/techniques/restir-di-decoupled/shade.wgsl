@@ -103,7 +103,7 @@ fn shade_samples(pixel: vec2u, surface: Surface, selection: Selection) -> Shaded
     var targets = vec3f(0.0);
     var numerators = vec3f(0.0);
     var denominators = vec3f(0.0);
-    let domain_count = select(DOMAINS, 1u, params.bias_correction == BIAS_CORRECTION_NONE);
+    let domain_count = select(DOMAINS, 1u, params.bias_correction == REUSE_WEIGHT_NONE);
     for (var j = 0u; j < domain_count; j += 1u) {
         if samples.confidences[j] <= 0.0 {
             continue;
@@ -124,7 +124,7 @@ fn shade_samples(pixel: vec2u, surface: Surface, selection: Selection) -> Shaded
                 value = 0.0;
             }
             var share = samples.confidences[j] * value;
-            if params.bias_correction == BIAS_CORRECTION_Z {
+            if params.bias_correction == REUSE_WEIGHT_Z {
                 share = select(0.0, samples.confidences[j], value > 0.0);
             }
             denominators[i] += share;
@@ -133,7 +133,7 @@ fn shade_samples(pixel: vec2u, surface: Surface, selection: Selection) -> Shaded
             }
         }
     }
-    if params.bias_correction == BIAS_CORRECTION_NONE {
+    if params.bias_correction == REUSE_WEIGHT_NONE {
         numerators = samples.confidences;
         denominators = vec3f(samples.confidences.x + samples.confidences.y + samples.confidences.z);
     }
