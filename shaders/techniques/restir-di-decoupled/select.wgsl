@@ -62,18 +62,17 @@ fn select_domains(pixel: vec2u, surface: Surface, selection: ptr<function, Selec
     }
     let position = previous_position(pixel);
     let film = project(frame.previous_camera, position);
-    if !is_on_film(film) {
-        return;
-    }
+    let is_seen = is_on_film(film);
+    // What comes into the picture has neighbours at its edge.
+    let center = vec2u(clamp(film, vec2f(0.0), vec2f(frame.size) - 1.0));
     let depth = previous_depth(position);
-    let center = vec2u(film);
     var rng = rng_new(pixel, frame.index, frame.seed, STREAM_TEMPORAL);
     // One loop, for each call is inlined: first the same point, then those near it.
     var temporal = NONE;
     var spatiotemporal = NONE;
     let tries = select(0u, params.spatiotemporal_tries, params.spatiotemporal_reuse == 1u);
     for (var i = 0u; i < 1u + 2u * tries; i += 1u) {
-        if i == 0u && params.temporal_reuse == 0u {
+        if i == 0u && (params.temporal_reuse == 0u || !is_seen) {
             continue;
         }
         // The second half is for filling a disocclusion.
@@ -92,7 +91,7 @@ fn select_domains(pixel: vec2u, surface: Surface, selection: ptr<function, Selec
             continue;
         }
         let candidate = vec2u(place);
-        if i > 0u && all(candidate == center) {
+        if i > 0u && is_seen && all(candidate == center) {
             continue;
         }
         if !is_similar(surface, depth, candidate) {

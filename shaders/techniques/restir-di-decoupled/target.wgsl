@@ -18,9 +18,10 @@ fn approximate_scatter(surface: Surface, wi: vec3f, distance: f32) -> f32 {
     let metallic = surface.bsdf.metallic;
     let alpha_2 = square(surface.bsdf.alpha.x);
     // The half vector by its cosines alone: |wo + wi|^2 = 2 + 2 cos.
-    let inverse_length = inverseSqrt(max(2.0 + 2.0 * dot(surface.wo, wi), 1e-12));
+    let length_2 = max(2.0 + 2.0 * dot(surface.wo, wi), 1e-12);
+    let inverse_length = inverseSqrt(length_2);
     let cos_half = min((cos_i + cos_o) * inverse_length, 1.0);
-    let cos_difference = clamp(1.0 - 0.5 / inverse_length, 0.0, 1.0);
+    let cos_difference = clamp(1.0 - 0.5 * length_2 * inverse_length, 0.0, 1.0);
     let spread = max(cos_half * cos_half * (alpha_2 - 1.0) + 1.0, alpha_2);
     let distribution = alpha_2 / (PI * spread * spread);
     // Smith's masking, correlated, as Hammon 2017 approximates it.
