@@ -231,6 +231,8 @@ fn enumeration(prefix: &str) -> BTreeMap<String, usize> {
 fn shaders_number_choices_as_declared() {
     let params = |id| techniques::find(id).expect("a technique").params;
     let choices = [
+        ("REUSE_WEIGHT_", params("restir-di-decoupled"), "bias_correction"),
+        ("VISIBILITY_", params("restir-di-decoupled"), "visibility"),
         ("SPATIAL_PATTERN_", params("restir-di"), "spatial_pattern"),
         ("PIXEL_ORDER_", params("restir-di"), "pixel_order"),
         ("CONFIGURATION_", params("restir-report"), "configuration"),
