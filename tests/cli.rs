@@ -329,7 +329,7 @@ fn scenes_and_techniques_are_listed() {
         assert!(params.iter().any(|parameter| parameter["name"] == name), "{name} in {listed}");
         assert!(text.contains(&format!("{group}.{name}")), "{group}.{name} in {text}");
     }
-    for id in ["normals", "path-tracer", "restir-di", "ris"] {
+    for id in ["normals", "path-tracer", "restir-di", "restir-report", "ris"] {
         let info = techniques.iter().find(|t| t["id"] == id).unwrap_or_else(|| panic!("{id} in {listed}"));
         assert!(info["title"].is_string() && info["summary"].is_string() && info["bias"].is_string(), "{info}");
         assert!(info["unbiased"].is_boolean() && info["papers"].is_array() && info["views"].is_array(), "{info}");

@@ -4,12 +4,12 @@
 mod support;
 
 use glam::UVec2;
-use restir::Error;
 use restir::gpu::recorder::Recorder;
 use restir::gpu::shader::{SceneFeatures, Shader, table};
 use restir::gpu::shader_source::{Flattened, flatten, reflect};
 use restir::gpu::specialize::specialize;
 use restir::params::{FilmParams, ParamKind, Params, RenderParams};
+use restir::{Error, techniques};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -229,9 +229,13 @@ fn enumeration(prefix: &str) -> BTreeMap<String, usize> {
 /// A uniform holds the index of a choice, so shaders must count choices as they are declared.
 #[test]
 fn shaders_number_choices_as_declared() {
+    let params = |id| techniques::find(id).expect("a technique").params;
     let choices = [
-        ("SPATIAL_PATTERN_", restir_di, "spatial_pattern"),
-        ("PIXEL_ORDER_", restir_di, "pixel_order"),
+        ("REUSE_WEIGHT_", params("restir-di-decoupled"), "bias_correction"),
+        ("VISIBILITY_", params("restir-di-decoupled"), "visibility"),
+        ("SPATIAL_PATTERN_", params("restir-di"), "spatial_pattern"),
+        ("PIXEL_ORDER_", params("restir-di"), "pixel_order"),
+        ("CONFIGURATION_", params("restir-report"), "configuration"),
         ("TONE_MAP_", FilmParams::SPECS, "tone_map"),
         ("MIS_", RenderParams::SPECS, "mis_heuristic"),
         ("PIXEL_FILTER_", RenderParams::SPECS, "pixel_filter"),

@@ -80,14 +80,19 @@ fn light_pmf(light: u32) -> f32 {
 fn light_sample(position: vec3f, rng: ptr<function, Rng>) -> LightSample {
     let bits = random_bits(rng);
     let light = choose_light(bits.xy);
+    return light_sample_on(light, position, bits.zw, rng);
+}
+
+// Draws a point on this light, from two random words and, for the environment, more.
+fn light_sample_on(light: u32, position: vec3f, bits: vec2u, rng: ptr<function, Rng>) -> LightSample {
     if scene_has_environment && light == frame.environment_light {
-        return LightSample(light, environment_sample(bits.zw, rng));
+        return LightSample(light, environment_sample(bits, rng));
     }
     if scene_has_shapes && lights[light].kind == LIGHT_TRIANGLE && is_sphere(load_triangle(lights[light].triangle).flags) {
-        let u = vec2f(bits_to_unit(bits.z), bits_to_unit(bits.w));
+        let u = vec2f(bits_to_unit(bits.x), bits_to_unit(bits.y));
         return LightSample(light, sample_sphere_light(light, position, u));
     }
-    return LightSample(light, pack_cell(bits.zw >> vec2u(16u)));
+    return LightSample(light, pack_cell(bits >> vec2u(16u)));
 }
 
 // The light sample that is the point where a ray from `surface` along `direction` ended, or one of no light. Its point is

@@ -98,6 +98,8 @@ pub enum Metric {
     Bias,
     /// Wall time of a frame, milliseconds.
     FrameMs,
+    /// Time of all passes of a frame, milliseconds by GPU timestamps.
+    GpuMs,
     /// Time of the technique's passes, without visibility buffer and film, milliseconds by GPU timestamps.
     LightingMs,
     /// Rays a pixel and frame.
@@ -106,13 +108,14 @@ pub enum Metric {
 
 impl Metric {
     /// Every metric, in the order of the CSV's columns.
-    pub const ALL: [Metric; 8] = [
+    pub const ALL: [Metric; 9] = [
         Metric::Mse,
         Metric::Rmse,
         Metric::Relmse,
         Metric::Mape,
         Metric::Bias,
         Metric::FrameMs,
+        Metric::GpuMs,
         Metric::LightingMs,
         Metric::Rays,
     ];
@@ -126,6 +129,7 @@ impl Metric {
             Metric::Mape => "mape",
             Metric::Bias => "bias",
             Metric::FrameMs => "frame-ms",
+            Metric::GpuMs => "gpu-ms",
             Metric::LightingMs => "lighting-ms",
             Metric::Rays => "rays",
         }
@@ -140,6 +144,7 @@ impl Metric {
             Metric::Mape => "MAPE",
             Metric::Bias => "signed bias, %",
             Metric::FrameMs => "frame, ms",
+            Metric::GpuMs => "all passes, ms",
             Metric::LightingMs => "lighting, ms",
             Metric::Rays => "rays a pixel",
         }
@@ -148,6 +153,11 @@ impl Metric {
     /// Whether it is judged by the reference.
     pub fn is_error(self) -> bool {
         matches!(self, Metric::Mse | Metric::Rmse | Metric::Relmse | Metric::Mape | Metric::Bias)
+    }
+
+    /// Whether it is a time: one number a run, however many of its frames are judged.
+    pub fn is_time(self) -> bool {
+        matches!(self, Metric::FrameMs | Metric::GpuMs | Metric::LightingMs)
     }
 }
 

@@ -42,6 +42,8 @@ pub struct Task<'a> {
 pub struct Run {
     /// Median wall time of a frame from recording to its end, milliseconds.
     pub frame_ms: f64,
+    /// Median time of all passes of a frame, milliseconds; none where the device cannot time.
+    pub gpu_ms: Option<f64>,
     /// Median time of the technique's passes in a frame, milliseconds; none where the device cannot time.
     pub lighting_ms: Option<f64>,
     /// One a judged frame.
@@ -76,6 +78,7 @@ impl Run {
             Metric::Mape => reading.mape,
             Metric::Bias => reading.bias.map(|fraction| 100.0 * fraction),
             Metric::FrameMs => Some(self.frame_ms),
+            Metric::GpuMs => self.gpu_ms,
             Metric::LightingMs => self.lighting_ms,
             Metric::Rays => Some(reading.rays),
         }
@@ -101,7 +104,7 @@ impl Task<'_> {
         let Task { scene, camera, motion, size, technique, settings, accumulate, frames, seed } = self;
         let settings = settings::describe(settings);
         format!(
-            "run 1|shaders {shaders}|scene {scene}|{camera:?}|{motion:?}|{size:?}|{technique}|{settings}|accumulate \
+            "run 2|shaders {shaders}|scene {scene}|{camera:?}|{motion:?}|{size:?}|{technique}|{settings}|accumulate \
              {accumulate}|frames {frames:?}|seed {seed}|reference {reference}|{adapter}"
         )
     }
@@ -152,7 +155,7 @@ impl Task<'_> {
     pub fn measure(&self, renderer: &mut Renderer, reference: &Image) -> Result<(Run, Image)> {
         self.prepare(renderer)?;
         let pixels = f64::from(self.size[0]) * f64::from(self.size[1]);
-        let (mut frame_ms, mut lighting_ms) = (Vec::new(), Vec::new());
+        let (mut frame_ms, mut gpu_ms, mut lighting_ms) = (Vec::new(), Vec::new(), Vec::new());
         let mut readings = Vec::new();
         let mut last = None;
         for frame in 1..=self.frames.last().copied().unwrap_or(1) {
@@ -165,6 +168,7 @@ impl Task<'_> {
             frame_ms.push(1e3 * start.elapsed().as_secs_f64());
             let times = block_on(renderer.pass_times())?;
             if !times.is_empty() {
+                gpu_ms.push(times.iter().map(|time| time.ms).sum());
                 let own = times.iter().filter(|t| !t.name.starts_with("scene/") && !t.name.starts_with("film/"));
                 lighting_ms.push(own.map(|time| time.ms).sum());
             }
@@ -186,8 +190,9 @@ impl Task<'_> {
             last = Some(image);
         }
         let last = last.ok_or_else(|| Error::bad_value("frames", "there is none to judge"))?;
-        let lighting_ms = if lighting_ms.is_empty() { None } else { Some(median(&lighting_ms)) };
-        Ok((Run { frame_ms: median(&frame_ms), lighting_ms, readings }, last))
+        let some = |times: &[f64]| (!times.is_empty()).then(|| median(times));
+        let run = Run { frame_ms: median(&frame_ms), gpu_ms: some(&gpu_ms), lighting_ms: some(&lighting_ms), readings };
+        Ok((run, last))
     }
 }
 

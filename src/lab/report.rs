@@ -51,10 +51,10 @@ fn head(findings: &Findings) -> String {
     }
     let [width, height] = experiment.size;
     let _ = write!(page, "\n```sh\n{}\n```\n\n", findings.command);
-    let _ = write!(
+    let _ = writeln!(
         page,
         "{width} × {height} on {}. {} independent runs; ± is 1.96 standard errors of their mean. References: {} frames of \
-         `path-tracer` ({}).{}\n",
+         `path-tracer` ({}).{}",
         findings.adapter,
         experiment.runs,
         experiment.reference.frames,
@@ -150,7 +150,7 @@ fn strip_legend(site: &Site) -> String {
 fn plot_of(experiment: &Experiment, site: &Site, points: &[&Point], metric: Metric) -> Result<Option<String>> {
     // What a frame takes is one number a run, however many of its frames are judged.
     let axis = match (experiment.axis(), metric) {
-        (Axis::Frame | Axis::Time, Metric::FrameMs | Metric::LightingMs) => Axis::Series,
+        (Axis::Frame | Axis::Time, metric) if metric.is_time() => Axis::Series,
         (axis, _) => axis,
     };
     let half = |mean: Mean| Z_95_TWO_SIDED * mean.error.unwrap_or(0.0);

@@ -62,10 +62,11 @@ impl Point {
     }
 
     /// Milliseconds that the picture after a frame took: all frames where they are averaged; else one, for the frames
-    /// before it had pictures of their own.
+    /// before it had pictures of their own. Of all passes by GPU timestamps, or by the wall where the device has none.
     pub fn time(&self, frame: u32) -> f64 {
         let frames = if self.accumulate { frame } else { 1 };
-        f64::from(frames) * self.mean(Metric::FrameMs, frame).map_or(0.0, |mean| mean.mean)
+        let one = self.mean(Metric::GpuMs, frame).or_else(|| self.mean(Metric::FrameMs, frame));
+        f64::from(frames) * one.map_or(0.0, |mean| mean.mean)
     }
 
     /// The last judged frame.

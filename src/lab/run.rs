@@ -73,6 +73,13 @@ struct Item<'a> {
     size: [u32; 2],
 }
 
+/// A scene and a size, and the values of the first sweep that share them: these are measured in turns.
+struct Group<'a> {
+    name: String,
+    size: [u32; 2],
+    values: Vec<Option<&'a Value>>,
+}
+
 /// A scene as it is measured.
 struct Stand<'a> {
     place: &'a Place,
@@ -125,19 +132,20 @@ impl Lab<'_> {
         let curves = experiment.curves();
         let sweep = experiment.sweeps.first();
         let mut site = Site { name: place.name.clone(), noise: Vec::new(), tiles: Vec::new() };
-        // Values that share a scene and a size are measured in turns.
-        let groups: Vec<(String, [u32; 2], Vec<Option<&Value>>)> = match sweep.map(|s| (s.key.as_str(), &s.values)) {
+        let group = |name: &str, size, values| Group { name: name.to_owned(), size, values };
+        let groups: Vec<Group> = match sweep.map(|sweep| (sweep.key.as_str(), &sweep.values)) {
             Some(("scene", values)) => {
-                values.iter().map(|v| (place.name.replace('*', &v.0), experiment.size, vec![Some(v)])).collect()
+                let of = |v| group(&place.name.replace('*', &Value::to_string(v)), experiment.size, vec![Some(v)]);
+                values.iter().map(of).collect()
             }
             Some(("size", values)) => {
-                let group = |v| Ok((place.name.clone(), parse_size(&place.name, v)?, vec![Some(v)]));
-                values.iter().map(group).collect::<Result<_>>()?
+                let of = |v| Ok(group(&place.name, parse_size(&place.name, v)?, vec![Some(v)]));
+                values.iter().map(of).collect::<Result<_>>()?
             }
-            Some((_, values)) => vec![(place.name.clone(), experiment.size, values.iter().map(Some).collect())],
-            None => vec![(place.name.clone(), experiment.size, vec![None])],
+            Some((_, values)) => vec![group(&place.name, experiment.size, values.iter().map(Some).collect())],
+            None => vec![group(&place.name, experiment.size, vec![None])],
         };
-        for (scene, size, values) in groups {
+        for Group { name: scene, size, values } in groups {
             (self.options.progress)(&format!("{scene}: scene"), 0, 0);
             let flat = (self.options.load)(&scene)?;
             let key = scene_key(&flat);

@@ -32,8 +32,12 @@ impl Estimate {
     /// # Errors
     /// Those of rendering.
     pub fn radiance(renderer: &mut Renderer, runs: u32, frames: u32, tile: u32) -> Result<Self> {
-        let pictures = pictures(renderer, runs, frames)?;
-        Ok(Self::of(&pictures.iter().map(|picture| region_means(picture, tile)).collect::<Vec<_>>()))
+        Ok(Self::of_pictures(&pictures(renderer, runs, frames)?, tile))
+    }
+
+    /// The same of the pictures of independent runs.
+    pub fn of_pictures(pictures: &[Image], tile: u32) -> Self {
+        Self::of(&pictures.iter().map(|picture| region_means(picture, tile)).collect::<Vec<_>>())
     }
 }
 
@@ -50,8 +54,8 @@ pub fn pictures(renderer: &mut Renderer, runs: u32, frames: u32) -> Result<Vec<I
     (0..runs).map(&mut run).collect()
 }
 
-/// Mean radiance of the picture, then of each tile.
-fn region_means(image: &Image, tile: u32) -> Vec<f64> {
+/// Mean radiance of the picture, then of each of its square tiles, `tile` pixels wide.
+pub fn region_means(image: &Image, tile: u32) -> Vec<f64> {
     let columns = image.width / tile;
     let mut sums = vec![0.0; 1 + (columns * (image.height / tile)) as usize];
     for (i, pixel) in image.pixels.iter().enumerate() {

@@ -125,39 +125,29 @@ pub const ALL: &[BuiltinInfo] = &[
 /// # Errors
 /// [`Error::Unknown`] for a name that is not in [`ALL`]; [`Error::BadValue`] for a bad number after the `:`.
 pub fn make(name: &str) -> Result<Scene> {
-    if let Some(count) = name.strip_prefix("many-lights:") {
-        return many_lights::many_lights(count);
-    }
-    if let Some(count) = name.strip_prefix("hall:") {
-        return hall::hall(count);
-    }
-    let numbered: [(&str, fn(&str) -> Result<Scene>); 3] =
-        [("arcade", arcade::arcade), ("city", city::city), ("torches", torches::torches)];
-    for (stem, make) in numbered {
-        if name == stem {
-            return Err(Error::bad_value(
-                format!("{stem}:N"),
-                "the number of lights is missing, as in ".to_owned() + stem + ":400",
-            ));
-        }
-        if let Some(count) = name.strip_prefix(stem).and_then(|rest| rest.strip_prefix(':')) {
-            return make(count);
-        }
+    match name.split_once(':') {
+        Some(("many-lights", count)) => return many_lights::many_lights(count),
+        Some(("hall", count)) => return hall::hall(count),
+        Some(("arcade", count)) => return arcade::arcade(count),
+        Some(("city", count)) => return city::city(count),
+        Some(("torches", count)) => return torches::torches(count),
+        _ => {}
     }
     match name {
         "cornell" => Ok(cornell::cornell()),
         "cornell-64" => Ok(cornell::cornell_64()),
         "furnace" => Ok(furnace::furnace()),
         "veach-mis" => Ok(veach_mis::veach_mis()),
-        "many-lights" => {
-            Err(Error::bad_value("many-lights:N", "the number of lights is missing, as in many-lights:10000"))
-        }
-        "hall" => Err(Error::bad_value("hall:N", "the number of triangles is missing, as in hall:50000")),
         "area-lights" => Ok(area_lights::area_lights()),
         "glossy-spheres" => Ok(glossy_spheres::glossy_spheres()),
         "materials" => Ok(materials::materials()),
         "motion" => Ok(motion::motion()),
-        _ => Err(unknown(name)),
+        _ => match ALL.iter().find(|scene| scene.name == name) {
+            Some(scene) => {
+                Err(Error::bad_value(scene.form(), format!("its number is missing, as in {}", scene.example)))
+            }
+            None => Err(unknown(name)),
+        },
     }
 }
 
