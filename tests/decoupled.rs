@@ -178,7 +178,7 @@ fn every_kind_of_light() -> FlatScene {
 #[test]
 fn every_kind_of_light_is_drawn_as_often_as_it_says() {
     let gpu = gpu();
-    let estimate = |gpu: &Gpu, technique: &str, settings: &[(&str, &str)], plant: Option<&ShaderCopy>| {
+    let estimate = |gpu: &Gpu, technique: &str, settings: &[(&str, &str)], frames, plant: Option<&ShaderCopy>| {
         let settings = [DIRECT, settings].concat();
         let mut renderer = renderer(gpu, every_kind_of_light(), [48; 2], technique, &settings);
         render(&mut renderer, 1);
@@ -186,15 +186,15 @@ fn every_kind_of_light_is_drawn_as_often_as_it_says() {
             gpu.watch_shaders(&folder.0);
             folder.edit("scene/light_tiles.wgsl", "light.pmf / (4.0 * PI", "light.pmf / (2.0 * PI");
         }
-        Estimate::radiance(&mut renderer, 32, 24, 48)
+        Estimate::radiance(&mut renderer, 48, frames, 48)
     };
-    let truth = estimate(&gpu, "path-tracer", &[], None);
+    let truth = estimate(&gpu, "path-tracer", &[], 64, None);
     let settings = [("indirect", "no"), ("visibility", "mis"), ("candidates", "32"), ("history_cap", "4")];
-    let comparison = Comparison::new(&estimate(&gpu, TECHNIQUE, &settings, None), &truth, MARGINS);
+    let comparison = Comparison::new(&estimate(&gpu, TECHNIQUE, &settings, 32, None), &truth, MARGINS);
     println!("every kind of light: {comparison}");
     assert!(comparison.is_equivalent());
     // A plant: spheres as if half of each were drawn.
-    let planted = estimate(&fresh_gpu(), TECHNIQUE, &settings, Some(&ShaderCopy::new()));
+    let planted = estimate(&fresh_gpu(), TECHNIQUE, &settings, 8, Some(&ShaderCopy::new()));
     let comparison = Comparison::new(&planted, &truth, MARGINS);
     println!("half spheres: {comparison}");
     assert!(comparison.is_caught());
