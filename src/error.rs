@@ -1,5 +1,7 @@
 //! Every way an operation can fail, with one clear line for a person and one stable code for a program.
 
+use restir_decoders::Fault;
+
 /// The result of every fallible operation of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
@@ -34,7 +36,7 @@ pub enum Error {
         what: String,
     },
     /// A name (scene, technique, parameter, view, camera) is not known.
-    #[error("unknown {kind} '{name}'; known: {known}")]
+    #[error("unknown {kind} '{name}'; {}", if known.is_empty() { "there are none".into() } else { format!("known: {known}") })]
     Unknown {
         /// What kind of thing was named.
         kind: &'static str,
@@ -92,6 +94,20 @@ impl Error {
             Error::Limit { .. } => "LIMIT",
             Error::Device(_) => "DEVICE",
             Error::Shader { .. } => "SHADER",
+        }
+    }
+
+    /// What a decoder says of a file; the part of its message before a colon is where.
+    pub(crate) fn of_fault(file: &str, fault: Fault) -> Self {
+        match fault {
+            Fault::Broken(what) => {
+                let (place, what) = what.split_once(": ").unwrap_or(("file", &what));
+                Error::bad_file(file, place, what)
+            }
+            Fault::Unsupported(what) => Error::Unsupported { file: file.to_owned(), what },
+            Fault::TooLarge { pixels, most } => {
+                Error::Limit { what: format!("{file}: the picture"), wanted: pixels, had: most, unit: "pixels" }
+            }
         }
     }
 

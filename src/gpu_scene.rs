@@ -271,8 +271,7 @@ fn features(scene: &FlatScene) -> SceneFeatures {
         sheen: any(|m| m.sheen_color != Vec3::ZERO),
         clearcoat: any(|m| m.clearcoat > 0.0),
         iridescence: any(|m| m.iridescence > 0.0),
-        energy_compensation: false,
-        conserving_mix: false,
+        ..SceneFeatures::NONE
     }
 }
 

@@ -368,7 +368,7 @@ impl Renderer {
         }
     }
 
-    /// Looks through camera `index` of the scene, and moves with it.
+    /// Looks through camera `index` of the scene, and moves with it. From another camera this is a cut: history is dropped.
     ///
     /// # Errors
     /// `UNKNOWN_NAME` listing the cameras there are.
@@ -380,6 +380,10 @@ impl Renderer {
                 known: (0..self.scene.cameras.len()).map(|i| i.to_string()).collect::<Vec<_>>().join(", "),
             });
         };
+        if self.followed != Some(index) {
+            self.previous_camera = None;
+            self.has_history = false;
+        }
         self.camera = camera;
         self.followed = Some(index);
         self.restart_film = true;

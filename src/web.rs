@@ -44,12 +44,17 @@ pub fn describe() -> String {
     crate::describe().to_string()
 }
 
-/// What surrounds a scene instead of its own environment: `sky...` or `white`, or the bytes of a map of that name.
+/// What surrounds a scene instead of its own environment: `sky...` or `white`, or a map of that name as the decoders' module
+/// gives it.
 type Surroundings = (Option<String>, Option<Vec<u8>>);
 
 fn surround(scene: &mut Scene, surroundings: Surroundings) -> crate::Result<()> {
     match surroundings {
-        (Some(name), Some(bytes)) => environment::surround(scene, &name, &bytes),
+        (Some(name), Some(bytes)) => {
+            let map = environment::Map::from_bytes(&bytes);
+            let map = map.ok_or_else(|| Error::bad_file(&name, "map", "the decoder gave no map"))?;
+            environment::surround_by(scene, &name, map)
+        }
         (Some(name), None) if !scene.surround(&name)? => {
             Err(Error::Unknown { kind: "environment", name, known: "sky, white".into() })
         }
@@ -73,8 +78,8 @@ fn flatten(
     Ok(flat.to_bytes())
 }
 
-/// A built-in scene as `FlatScene` bytes, surrounded by `environment`: `sky...`, `white`, or the name of `map`, the bytes
-/// of an .hdr or .exr file. For a Worker.
+/// A built-in scene as `FlatScene` bytes, surrounded by `environment`: `sky...`, `white`, or the name of `map`, which
+/// is as the decoders' module gives it. For a Worker.
 #[wasm_bindgen]
 pub fn flatten_builtin(
     name: &str,

@@ -5,9 +5,12 @@ mod support;
 
 use glam::{DVec3, Mat4, Quat, Vec3};
 use restir::gpu::shader::table;
+use restir::lab::mean;
 use restir::scene::area_light::{AreaLight, Outline};
 use restir::scene::intersect::intersect_cpu;
 use restir::scene::random::Random;
+
+use restir::scene::stage::Stage;
 use restir::scene::{Camera, Scene, gltf};
 use serde_json::json;
 use std::f64::consts::{PI, TAU};
@@ -299,4 +302,82 @@ fn files_place_area_lights() {
         assert_eq!(error.code(), "BAD_FILE", "{error}");
         assert!(error.to_string().contains(what) && error.to_string().contains("restir_area_light"), "{error}");
     }
+}
+
+/// A file whose lights with a shape hang on animated nodes shows at a moment what a file shows where they stand there.
+#[test]
+fn area_lights_follow_their_nodes() {
+    // Held by one node each: (extras, translation at 0 s and at 2 s).
+    let lights = [
+        (json!({"type": "sphere", "radius": 0.2, "radiance": 20}), [[-0.6, 1.7, 0.0], [-0.2, 0.5, 0.2]]),
+        (
+            json!({"type": "rectangle", "width": 0.4, "height": 0.3, "radiance": 30}),
+            [[0.5, 1.6, -0.4], [0.3, 0.6, 0.4]],
+        ),
+        (json!({"type": "disk", "radius": 0.25, "radiance": 25}), [[0.0, 1.8, 0.5], [0.6, 0.9, 0.0]]),
+    ];
+    let down = [-std::f32::consts::FRAC_1_SQRT_2, 0.0, 0.0, std::f32::consts::FRAC_1_SQRT_2];
+    let file = |still_at: Option<f32>| {
+        let mut writer = Writer::new(json!({"scene": 0, "scenes": [{"nodes": [0, 1, 2, 3]}]}));
+        let corners = [-1.0, 0.0, -1.0, -1.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0, 0.0, -1.0];
+        let positions = writer.floats("VEC3", &corners);
+        let indices = writer.indices(&[0, 1, 2, 0, 2, 3]);
+        let floor = json!({"attributes": {"POSITION": positions}, "indices": indices});
+        writer.push("meshes", json!({"primitives": [floor]}));
+        writer.push("nodes", json!({"mesh": 0}));
+        let times = writer.floats("SCALAR", &[0.0, 2.0]);
+        let (mut samplers, mut channels) = (Vec::new(), Vec::new());
+        for (i, (light, [from, to])) in lights.iter().enumerate() {
+            let at = still_at.map_or(*from, |t| [0, 1, 2].map(|k| from[k] + (to[k] - from[k]) * t / 2.0));
+            let extras = json!({"restir_area_light": light});
+            writer.push("nodes", json!({"translation": at, "rotation": down, "extras": extras}));
+            let path = writer.floats("VEC3", &[*from, *to].concat());
+            samplers.push(json!({"input": times, "output": path}));
+            channels.push(json!({"sampler": i, "target": {"node": i + 1, "path": "translation"}}));
+        }
+        if still_at.is_none() {
+            writer.push("animations", json!({"samplers": samplers, "channels": channels}));
+        }
+        let mut scene = gltf::load_bytes("lights.glb", &writer.glb(), &mut |_| unreachable!()).expect("a scene");
+        let eye = Camera::look_at("eye", [0.0, 2.0, 2.5].into(), [0.0, 0.3, 0.0].into(), 0.9);
+        scene.cameras = vec![eye];
+        scene
+    };
+    let moving = file(None);
+    assert_eq!(moving.rig.instances.len(), 3);
+    let settings = [("render.max_depth", "1")];
+    for technique in ALL {
+        let picture = |scene: &Scene, time: f64| {
+            let mut renderer = renderer(&gpu(), flatten(scene), [48, 32], technique, &settings);
+            renderer.set_accumulate(true);
+            // Not from the first moment on: what is shown is where the lights have moved to.
+            for time in [0.0, time] {
+                renderer.set_time(time);
+                renderer.render_frame().expect("a frame");
+            }
+            mean(&render(&mut renderer, 64)).map(|c| c as f32)
+        };
+        let (seen, expected) = (picture(&moving, 1.5), picture(&file(Some(1.5)), 0.0));
+        let before = picture(&file(Some(0.0)), 0.0);
+        for c in 0..3 {
+            assert!((seen[c] / expected[c] - 1.0).abs() < 0.01, "{technique}: {seen:?}, should be {expected:?}");
+        }
+        assert!((before[0] / expected[0] - 1.0).abs() > 0.05, "{technique}: {before:?} at rest, {expected:?} moved");
+    }
+}
+
+/// A scale that changes by axis would make it something that is neither drawn nor sampled as a sphere.
+#[test]
+fn a_sphere_that_is_squeezed_stays_as_it_was() {
+    let mut writer = Writer::new(json!({"scene": 0, "scenes": [{"nodes": [0]}]}));
+    let light = json!({"type": "sphere", "radius": 0.5});
+    writer.push("nodes", json!({"extras": {"restir_area_light": light}}));
+    let (times, scales) =
+        (writer.floats("SCALAR", &[0.0, 1.0]), writer.floats("VEC3", &[1.0, 1.0, 1.0, 3.0, 1.0, 1.0]));
+    let channel = json!({"sampler": 0, "target": {"node": 0, "path": "scale"}});
+    writer.push("animations", json!({"samplers": [{"input": times, "output": scales}], "channels": [channel]}));
+    let scene = flatten(&gltf::load_bytes("light.glb", &writer.glb(), &mut |_| unreachable!()).expect("a scene"));
+    assert_eq!(scene.rig.instances.len(), 1);
+    let stage = Stage::new(&scene, 0, 0.5);
+    assert_eq!(stage.transforms, [Mat4::IDENTITY]);
 }

@@ -329,7 +329,7 @@ fn scenes_and_techniques_are_listed() {
         assert!(params.iter().any(|parameter| parameter["name"] == name), "{name} in {listed}");
         assert!(text.contains(&format!("{group}.{name}")), "{group}.{name} in {text}");
     }
-    for id in ["normals", "path-tracer", "restir-di", "ris"] {
+    for id in ["normals", "path-tracer", "restir-di", "restir-report", "ris"] {
         let info = techniques.iter().find(|t| t["id"] == id).unwrap_or_else(|| panic!("{id} in {listed}"));
         assert!(info["title"].is_string() && info["summary"].is_string() && info["bias"].is_string(), "{info}");
         assert!(info["unbiased"].is_boolean() && info["papers"].is_array() && info["views"].is_array(), "{info}");
@@ -483,6 +483,11 @@ fn bench_rays_traces_a_file() {
     assert_eq!(words.len(), 6);
     assert!((f32::from_bits(words[0]) - 0.3).abs() < 0.05 && words[1] != u32::MAX, "{words:?}");
     assert_eq!(words[2..], [100f32.to_bits(), u32::MAX, 0.1f32.to_bits(), u32::MAX]);
+
+    let overwrite = restir(&["bench", "rays", "builtin:cornell", "--rays", &file, "--hits", &file]);
+    assert_eq!((overwrite.status.code(), std::fs::read(&file).unwrap()), (Some(2), rays.clone()));
+    let nowhere = restir(&["bench", "rays", "builtin:cornell", "--eye", "1,2,3", "--target", "1,2,3"]);
+    assert_eq!(nowhere.status.code(), Some(2));
 
     let short = folder.write("short.bin", &rays[..31]);
     let endless = restir(&["bench", "rays", "builtin:cornell", "--rays", "/dev/zero"]);

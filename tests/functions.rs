@@ -135,6 +135,36 @@ fn warps_equal_their_twins() {
 }
 
 #[test]
+fn warps_come_back() {
+    let steps = (0..16).map(|i| (i as f32 + 0.5) / 16.0);
+    let all: Vec<[f32; 2]> = steps.clone().flat_map(|x| steps.clone().map(move |y| [x, y])).collect();
+    let inputs: Vec<_> = all.iter().map(|u| TestInput::floats(&[[u[0], u[1], 0.0, 0.0]])).collect();
+    for (u, output) in all.iter().zip(functions(functions::UNWARPED, &inputs)) {
+        let [disk_x, disk_y, triangle_x, triangle_y] = output.a();
+        for (back, there) in [(disk_x, u[0]), (disk_y, u[1]), (triangle_x, u[0]), (triangle_y, u[1])] {
+            assert_close(back, f64::from(there), 2e-6, u);
+        }
+    }
+}
+
+/// A reservoir in three words: what is rounded, how far, and what is not.
+#[test]
+fn packed_weights_come_back_rounded() {
+    let mut all: Vec<[f32; 2]> = vec![[0.0, 0.0], [f32::MAX, 8e9], [1e-37, 1e-9]];
+    all.extend((0..=128).map(|c| [1.37f32.powi(c - 64), c as f32]));
+    let inputs: Vec<_> = all.iter().map(|u| TestInput::floats(&[[u[0], u[1], 0.0, 0.0]])).collect();
+    for ([w, c], output) in all.iter().zip(functions(functions::PACKED, &inputs)) {
+        let [w_back, c_back, ..] = output.a();
+        assert!(
+            w_back.is_finite() && (w_back / w.max(1e-38) - w / w.max(1e-38)).abs() <= 1.0 / 8192.0,
+            "{w_back} for {w}"
+        );
+        let tolerance = if c.fract() == 0.0 && *c <= 128.0 { 0.0 } else { c / 128.0 };
+        assert!((c_back - c).abs() <= tolerance, "{c_back} for {c}");
+    }
+}
+
+#[test]
 fn srgb_equals_the_standard_and_comes_back() {
     let values: Vec<f32> = (0..=1000).map(|i| i as f32 / 1000.0).collect();
     let input = |x: f32| TestInput::floats(&[[x, x, x, 0.0]]);

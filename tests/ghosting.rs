@@ -122,16 +122,7 @@ fn mover(scene: &mut Scene, (p0, r0): Pose, (p1, r1): Pose) -> u32 {
 fn hang(scene: &mut Scene, mesh: Mesh, node: u32) {
     let instance = scene.instances.len() as u32;
     place(scene, mesh);
-    let (offset, skin) = (Mat4::IDENTITY, u32::MAX);
-    scene.rig.instances.push(Placement {
-        offset,
-        instance,
-        node,
-        skin,
-        first_weight: 0,
-        weight_count: 0,
-        padding: [0; 3],
-    });
+    scene.rig.instances.push(Placement::rigid(instance, node));
 }
 
 fn slide(from: Vec3, to: Vec3) -> [Pose; 2] {

@@ -204,7 +204,9 @@ fn an_experiment_writes_whole_files_once_and_goes_on_from_what_it_has() {
     assert_eq!((outcome.measured, outcome.kept), (0, 4));
     assert!(!heard.iter().any(|what| what.contains("reference")), "{heard:?}");
     let after: Vec<_> = files[1..].iter().map(|file| std::fs::read(out.0.join(file)).unwrap()).collect();
-    assert!(before == after, "the same numbers give the same files");
+    for ((file, before), after) in files[1..].iter().zip(&before).zip(&after) {
+        assert!(before == after, "{file}: the same numbers give the same files");
+    }
 
     // A run that was lost or spoilt is measured again, and only that.
     let points = out.names("points").into_iter().filter(|name| name.ends_with(".json")).collect::<Vec<_>>();

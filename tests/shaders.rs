@@ -133,7 +133,7 @@ fn passes_stay_valid_for_every_scene() {
         check(shader, &|_| false);
     }
     // Every feature is in these.
-    for shader in [&table::RESTIR_DI_TEMPORAL, &table::PATH_TRACER_TRACE] {
+    for shader in [&table::RESTIR_DI_INITIAL, &table::RESTIR_DI_TEMPORAL, &table::PATH_TRACER_TRACE] {
         for feature in shader.overrides {
             check(shader, &|name| name == *feature);
             check(shader, &|name| name != *feature);
@@ -229,9 +229,13 @@ fn enumeration(prefix: &str) -> BTreeMap<String, usize> {
 /// A uniform holds the index of a choice, so shaders must count choices as they are declared.
 #[test]
 fn shaders_number_choices_as_declared() {
-    let restir_di = techniques::find("restir-di").expect("a technique").params;
+    let params = |id| techniques::find(id).expect("a technique").params;
     let choices = [
-        ("BIAS_CORRECTION_", restir_di, "bias_correction"),
+        ("REUSE_WEIGHT_", params("restir-di-decoupled"), "bias_correction"),
+        ("VISIBILITY_", params("restir-di-decoupled"), "visibility"),
+        ("SPATIAL_PATTERN_", params("restir-di"), "spatial_pattern"),
+        ("PIXEL_ORDER_", params("restir-di"), "pixel_order"),
+        ("CONFIGURATION_", params("restir-report"), "configuration"),
         ("TONE_MAP_", FilmParams::SPECS, "tone_map"),
         ("MIS_", RenderParams::SPECS, "mis_heuristic"),
         ("PIXEL_FILTER_", RenderParams::SPECS, "pixel_filter"),

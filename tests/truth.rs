@@ -31,6 +31,11 @@ fn restir_di_keeps_its_claims() {
 }
 
 #[test]
+fn restir_di_decoupled_keeps_its_claims() {
+    prove("restir-di-decoupled");
+}
+
+#[test]
 fn ris_keeps_its_claims() {
     prove("ris");
 }

@@ -208,7 +208,8 @@ class App {
     }
     viewer.set_speed(state.speed);
     viewer.set_time(state.time);
-    const accumulate = state.accumulate ?? !report.animated;
+    const turns = Number(state.values.get('render.environment_rotation_rate') ?? 0) !== 0;
+    const accumulate = state.accumulate ?? !(report.animated || turns);
     viewer.set_accumulate(accumulate);
     this.time.open(report, viewer.animation(), state.speed);
     this.showAccumulate(accumulate);

@@ -18,6 +18,13 @@ function decoded(uri: string): string {
   }
 }
 
+/** What a decoder threw, with the name of the file. */
+function named(name: string, thrown: unknown) {
+  const { code, message } = toFailure(thrown);
+  if (message.startsWith(name)) return { code, message };
+  return { code, message: `${name}: ${message}${code === 'UNSUPPORTED' ? ' is not supported' : ''}` };
+}
+
 /** The bytes of a map that was given by its address. */
 async function fetched({ name, address = '' }: Surroundings): Promise<Uint8Array> {
   progress(0, `Loading ${name}`);
@@ -49,7 +56,7 @@ async function read(file: File): Promise<[string, Uint8Array]> {
   }
 }
 
-/** Name and bytes of what surrounds the scene. */
+/** Name of what surrounds the scene, and the map that it is as the decoders give it. */
 type Around = [environment: string | undefined, map: Uint8Array | undefined];
 
 async function flattenFile({ name, files, choice }: SceneSource & { kind: 'file' }, lights: number, seed: number, around: Around): Promise<Loaded> {
@@ -70,8 +77,7 @@ async function flattenFile({ name, files, choice }: SceneSource & { kind: 'file'
       const { glb, warnings } = decoders.convert_obj(main, resolve) as { glb: Uint8Array; warnings: string[] };
       return { flat: flatten(glb, decoders, warnings) };
     } catch (error) {
-      const { code, message } = toFailure(error);
-      throw { code, message: message.startsWith(name) ? message : `${name}: ${message}` };
+      throw named(name, error);
     }
   }
   const contents = JSON.parse(contents_of(name, main)) as Contents & { needs_decoders: boolean };
@@ -79,8 +85,19 @@ async function flattenFile({ name, files, choice }: SceneSource & { kind: 'file'
   return { flat: flatten(main, decoders, []), contents };
 }
 
+async function readAround(surroundings: Surroundings | undefined): Promise<Around> {
+  const file = surroundings?.address ? await fetched(surroundings) : surroundings?.bytes;
+  if (!surroundings || !file) return [surroundings?.name, undefined];
+  const decoders = await fetchDecoders();
+  try {
+    return [surroundings.name, decoders.decode_map(file)];
+  } catch (error) {
+    throw named(surroundings.name, error);
+  }
+}
+
 async function load({ source, surroundings, lights, seed }: LoadRequest): Promise<Loaded> {
-  const around: Around = [surroundings?.name, surroundings?.address ? await fetched(surroundings) : surroundings?.bytes];
+  const around = await readAround(surroundings);
   if (source.kind === 'builtin') return { flat: flatten_builtin(source.name, lights, seed, ...around, progress) };
   return flattenFile(source, lights, seed, around);
 }

@@ -1,5 +1,5 @@
-//! The decoders that only some files need: Draco and meshopt geometry; PNG, JPEG, WebP and Basis Universal pictures; Wavefront
-//! OBJ.
+//! The decoders that only some files need: Draco and meshopt geometry; PNG, JPEG, WebP and Basis Universal pictures; OpenEXR
+//! and Radiance maps; Wavefront OBJ.
 //!
 //! Native programs link them. The page keeps them in a wasm module of their own, which its Worker fetches when a file
 //! asks for one, so that nobody else downloads them.
@@ -7,7 +7,9 @@
 //! Nothing in a file is trusted: what a decoder may produce is bounded by the caller, and checked before it is allocated.
 
 pub mod draco;
+pub mod exr;
 mod ktx2;
+pub mod map;
 pub mod meshopt;
 #[cfg(all(target_arch = "wasm32", feature = "module"))]
 mod module;
@@ -22,6 +24,13 @@ pub enum Fault {
     Broken(String),
     /// They are sound but of a kind that is not decoded.
     Unsupported(String),
+    /// A map has more pixels than the caller takes.
+    TooLarge {
+        /// How many it has.
+        pixels: u64,
+        /// How many it may have.
+        most: u64,
+    },
 }
 
 /// What every decoder returns.

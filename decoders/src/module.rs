@@ -1,6 +1,6 @@
 //! What the page's Worker calls. Errors are `{code, message}` objects, codes as those of restir's own errors.
 
-use crate::{Fault, draco, meshopt, obj, picture};
+use crate::{Fault, draco, map, meshopt, obj, picture};
 use js_sys::{Function, Object, Reflect, Uint8Array};
 use wasm_bindgen::prelude::*;
 
@@ -19,6 +19,9 @@ fn js_error(fault: Fault) -> JsValue {
     let (code, message) = match fault {
         Fault::Broken(what) => ("BAD_FILE", what),
         Fault::Unsupported(what) => ("UNSUPPORTED", what),
+        Fault::TooLarge { pixels, most } => {
+            ("LIMIT", format!("the picture has {pixels} pixels; at most {most} are read"))
+        }
     };
     object([("code", code.into()), ("message", message.into())])
 }
@@ -41,6 +44,12 @@ pub fn decode_meshopt(bytes: &[u8], mode: &str, filter: &str, count: u32, stride
 pub fn decode_picture(bytes: &[u8], max_side: u32, max_bytes: f64) -> JsResult<Vec<u8>> {
     let limits = picture::Limits { side: max_side, bytes: max_bytes as u64 };
     picture::decode(bytes, limits).map(picture::Picture::into_bytes).map_err(js_error)
+}
+
+/// An OpenEXR or Radiance map as [`map::Map::to_bytes`].
+#[wasm_bindgen]
+pub fn decode_map(bytes: &[u8]) -> JsResult<Vec<u8>> {
+    map::decode(bytes).map(|map| map.to_bytes()).map_err(js_error)
 }
 
 /// Wavefront OBJ as `{glb, warnings}`; `resolve(name)` gives the bytes of a file beside it, or undefined.

@@ -46,6 +46,23 @@ fn reservoir_sample(reservoir: Reservoir) -> LightSample {
     return LightSample(reservoir.light, reservoir.point);
 }
 
+// A reservoir in three words: light, point, and one of both weights. Its high 20 bits are W: 8 of exponent and 12 of
+// mantissa, rounded, so at most 1/8192 off. Its low 12 bits are c: 6 of exponent and 6 of mantissa, above 2^-31 and below
+// 2^33, rounded, so at most 1/128 off; whole numbers up to 128 are exact.
+fn pack_weights(reservoir: Reservoir) -> u32 {
+    // Signs are 0, and the largest finite number is not rounded up to infinity.
+    let w = min(bitcast<u32>(max(reservoir.unbiased_contribution_weight, 0.0)) + 0x400u, 0x7f7fffffu) >> 11u;
+    let c = bitcast<u32>(clamp(reservoir.confidence_weight, 0.0, 8.5e9)) + 0x10000u;
+    // The exponent counts from that of 2^-31, which stands for 0.
+    return (w << 12u) | (max(c >> 17u, 96u << 6u) - (96u << 6u));
+}
+
+fn unpack_reservoir(words: vec3u) -> Reservoir {
+    let c = words.z & 0xfffu;
+    return Reservoir(words.x, words.y, bitcast<f32>((words.z >> 12u) << 11u),
+        select(0.0, bitcast<f32>((c + (96u << 6u)) << 17u), c > 0u));
+}
+
 fn pack_cell(cell: vec2u) -> u32 {
     return cell.x | (cell.y << 16u);
 }

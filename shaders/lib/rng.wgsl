@@ -13,6 +13,10 @@ const STREAM_INITIAL = 2u;
 const STREAM_TEMPORAL = 3u;
 const STREAM_SPATIAL = 4u;
 const STREAM_INDIRECT = 8u;
+const STREAM_LIGHT_TILES = 16u;
+const STREAM_TILE_CHOICE = 17u;
+const STREAM_TILE_LIGHTS = 18u;
+const STREAM_DECOUPLED = 19u;
 
 // PCG4D, Jarzynski and Olano 2020, "Hash Functions for GPU Rendering".
 fn pcg4d(seed: vec4u) -> vec4u {

@@ -24,3 +24,22 @@ fn sample_triangle(u: vec2f) -> vec2f {
     let r = sqrt(u.x);
     return vec2f(r * (1.0 - u.y), r * u.y);
 }
+
+// The inverse of `sample_triangle`.
+fn unsample_triangle(weights: vec2f) -> vec2f {
+    let r = weights.x + weights.y;
+    return vec2f(r * r, weights.y / max(r, 1e-20));
+}
+
+// The inverse of `sample_disk`.
+fn unsample_disk(p: vec2f) -> vec2f {
+    let x_wider = abs(p.x) > abs(p.y);
+    let wide = select(p.y, p.x, x_wider);
+    let narrow = select(p.x, p.y, x_wider);
+    if wide == 0.0 {
+        return vec2f(0.5);
+    }
+    let r = sign(wide) * length(p);
+    let other = r * atan(narrow / wide) * (4.0 / PI);
+    return 0.5 * select(vec2f(other, r), vec2f(r, other), x_wider) + 0.5;
+}

@@ -27,6 +27,15 @@ fn shape_sample(shape: u32, u: vec2f) -> vec2f {
     }
 }
 
+// The inverse of `shape_sample`.
+fn shape_unsample(shape: u32, uv: vec2f) -> vec2f {
+    switch shape {
+        case SHAPE_RECTANGLE, SHAPE_SPHERE: { return uv; }
+        case SHAPE_DISK: { return unsample_disk(uv); }
+        default: { return unsample_triangle(uv); }
+    }
+}
+
 // The area of a flat shape over |e1 x e2|.
 fn shape_area_factor(shape: u32) -> f32 {
     switch shape {

@@ -112,7 +112,7 @@ struct Light {
     triangle: u32,
     instance: u32,
     previous: u32, // this light as it was in the previous frame
-    padding: u32,
+    cumulative: u32, // where its part of all words begins: a word that falls there chooses it
 }
 
 // What the scene has, fixed when a pipeline is made (src/gpu_scene.rs), so that no kernel carries code that its scene

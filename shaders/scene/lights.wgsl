@@ -15,6 +15,11 @@ const LIGHT_DIRECTIONAL = 3u;
 const LIGHT_ENVIRONMENT = 4u;
 const LIGHT_SUN = 5u;
 
+// How a light is chosen: by the alias table, or, settings of techniques (src/techniques/candidates.rs), by
+// search in the cumulative distribution or all alike.
+override light_choice_cdf: bool = false;
+override light_choice_uniform: bool = false;
+
 struct LightContribution {
     direction: vec3f, // unit, from the surface to the light
     distance: f32, // how far a shadow ray must be free
@@ -31,22 +36,102 @@ fn light_sample_barycentrics(sample: LightSample) -> vec2f {
     return sample_triangle(u);
 }
 
+// A light by its probability.
+fn choose_light(bits: vec2u) -> u32 {
+    if light_choice_cdf {
+        // The last light whose part begins at the word or before it.
+        var first = 0u;
+        var count = frame.light_count;
+        while count > 1u {
+            let half = count / 2u;
+            if lights[first + half].cumulative <= bits.x {
+                first += half;
+                count -= half;
+            } else {
+                count = half;
+            }
+        }
+        return first;
+    }
+    let light = bits_below(bits.x, frame.light_count);
+    if light_choice_uniform || bits_to_unit(bits.y) < lights[light].alias_threshold {
+        return light;
+    }
+    return lights[light].alias_light;
+}
+
+// The probability with which `choose_light` chooses a light.
+fn light_pmf(light: u32) -> f32 {
+    if light_choice_uniform {
+        return 1.0 / f32(frame.light_count);
+    }
+    if light_choice_cdf {
+        let start = lights[light].cumulative;
+        if light + 1u == frame.light_count {
+            return 1.0 - f32(start) * 2.3283064e-10;
+        }
+        return f32(lights[light + 1u].cumulative - start) * 2.3283064e-10;
+    }
+    return lights[light].pmf;
+}
+
 // Draws a light by its probability and a point on it, for a surface at `position`: on a sphere a point of the cap that is
 // seen from there.
 fn light_sample(position: vec3f, rng: ptr<function, Rng>) -> LightSample {
     let bits = random_bits(rng);
-    var light = bits_below(bits.x, frame.light_count);
-    if bits_to_unit(bits.y) >= lights[light].alias_threshold {
-        light = lights[light].alias_light;
-    }
+    let light = choose_light(bits.xy);
+    return light_sample_on(light, position, bits.zw, rng);
+}
+
+// Draws a point on this light, from two random words and, for the environment, more.
+fn light_sample_on(light: u32, position: vec3f, bits: vec2u, rng: ptr<function, Rng>) -> LightSample {
     if scene_has_environment && light == frame.environment_light {
-        return LightSample(light, environment_sample(bits.zw, rng));
+        return LightSample(light, environment_sample(bits, rng));
     }
     if scene_has_shapes && lights[light].kind == LIGHT_TRIANGLE && is_sphere(load_triangle(lights[light].triangle).flags) {
-        let u = vec2f(bits_to_unit(bits.z), bits_to_unit(bits.w));
+        let u = vec2f(bits_to_unit(bits.x), bits_to_unit(bits.y));
         return LightSample(light, sample_sphere_light(light, position, u));
     }
-    return LightSample(light, pack_cell(bits.zw >> vec2u(16u)));
+    return LightSample(light, pack_cell(bits >> vec2u(16u)));
+}
+
+// The light sample that is the point where a ray from `surface` along `direction` ended, or one of no light. Its point is
+// the centre of the cell in which the ray ended. In the sun's disk it is the sun, and the map behind is not sampled so.
+fn light_sample_of_hit(hit: Hit, direction: vec3f) -> LightSample {
+    if hit.triangle == NONE {
+        if scene_has_sun && is_in_sun(direction, frame.environment_turn) {
+            return LightSample(frame.sun_light, pack_point(sun_point(direction, frame.environment_turn)));
+        }
+        if scene_has_environment {
+            let uv = environment_uv(turn_to_map(direction, frame.environment_turn));
+            return LightSample(frame.environment_light, pack_point(uv));
+        }
+        return LightSample(NONE, 0u);
+    }
+    let triangle = load_triangle(hit.triangle);
+    var light = triangle.light;
+    if light == NONE {
+        return LightSample(NONE, 0u);
+    }
+    if scene_has_instances {
+        light += instance_first_light(hit.instance);
+    }
+    if scene_has_shapes {
+        return LightSample(light, pack_point(shape_unsample(shape_of(triangle.flags), hit.uv)));
+    }
+    return LightSample(light, pack_point(unsample_triangle(hit.uv)));
+}
+
+// Density of `light_sample_of_hit` in the sample's own measure, for rays drawn with density `pdf` per solid angle.
+fn light_hit_sample_pdf(sample: LightSample, light: LightContribution, pdf: f32) -> f32 {
+    if light.solid_angle_jacobian <= 0.0 {
+        return 0.0;
+    }
+    if scene_has_sun && scene_has_environment && sample.light == frame.environment_light
+        && is_in_sun(light.direction, frame.environment_turn) {
+        return 0.0;
+    }
+    return pdf / light.solid_angle_jacobian;
 }
 
 struct Sphere {
@@ -95,7 +180,7 @@ fn triangle_area(instance: u32, triangle: u32) -> f32 {
 
 // Density of `light_sample` in the sample's own measure.
 fn light_sample_pdf(position: vec3f, sample: LightSample) -> f32 {
-    let pmf = lights[sample.light].pmf;
+    let pmf = light_pmf(sample.light);
     let kind = lights[sample.light].kind;
     if kind == LIGHT_TRIANGLE {
         let instance = lights[sample.light].instance;
@@ -127,7 +212,7 @@ fn light_sample_pdf(position: vec3f, sample: LightSample) -> f32 {
 fn light_hit_pdf(light: u32, instance: u32, triangle: u32, position: vec3f, direction: vec3f, distance: f32) -> f32 {
     let flags = load_triangle(triangle).flags;
     if scene_has_shapes && is_sphere(flags) {
-        return lights[light].pmf * sphere_solid_angle_pdf(instance, triangle, position);
+        return light_pmf(light) * sphere_solid_angle_pdf(instance, triangle, position);
     }
     var cosine_times_area = abs(dot(triangle_normal(instance, triangle), direction)) * 0.5;
     if scene_has_shapes {
@@ -136,15 +221,15 @@ fn light_hit_pdf(light: u32, instance: u32, triangle: u32, position: vec3f, dire
     if cosine_times_area <= 0.0 {
         return 0.0;
     }
-    return lights[light].pmf * distance * distance / cosine_times_area;
+    return light_pmf(light) * distance * distance / cosine_times_area;
 }
 
 fn environment_hit_pdf(direction: vec3f) -> f32 {
-    return lights[frame.environment_light].pmf * environment_pdf(direction);
+    return light_pmf(frame.environment_light) * environment_pdf(direction);
 }
 
 fn sun_hit_pdf() -> f32 {
-    return lights[frame.sun_light].pmf * sun_pdf();
+    return light_pmf(frame.sun_light) * sun_pdf();
 }
 
 // KHR_lights_punctual: inverse square, windowed by the range where one is given.

@@ -21,6 +21,8 @@ const STREAM_MERGED = 13u;
 const POINTS = 14u;
 const CLASSIFY = 15u;
 const BITS_BELOW = 16u;
+const UNWARPED = 17u;
+const PACKED = 18u;
 
 // Streams the four weights of `weights` under the index they have there, from `first` on.
 fn stream_of(weights: vec4f, first: u32, count: u32, rng: ptr<function, Rng>) -> Stream {
@@ -78,6 +80,15 @@ fn evaluate(operation: u32, input: TestInput) -> TestOutput {
             return TestOutput(vec4u(point, 0u, 0u, 0u), bits(vec4f(unpack_point(point), 0.0, 0.0)));
         }
         case BITS_BELOW: { return TestOutput(vec4u(bits_below(input.a.x, input.a.y), 0u, 0u, 0u), vec4u(0u)); }
+        case UNWARPED: {
+            return TestOutput(bits(vec4f(unsample_disk(sample_disk(a.xy)), unsample_triangle(sample_triangle(a.xy)))),
+                vec4u(0u));
+        }
+        case PACKED: {
+            let packed = unpack_reservoir(vec3u(1u, 2u, pack_weights(Reservoir(1u, 2u, a.x, a.y))));
+            return TestOutput(
+                bits(vec4f(packed.unbiased_contribution_weight, packed.confidence_weight, 0.0, 0.0)), vec4u(0u));
+        }
         case CLASSIFY: {
             return TestOutput(vec4u(u32(is_nan(a.x)), u32(is_infinite(a.x)), 0u, 0u), vec4u(0u));
         }

@@ -25,9 +25,9 @@ use std::sync::{Arc, Mutex};
 /// A pass and the scene features it was specialised for.
 type PipelineKey = (&'static str, SceneFeatures);
 
-/// A pass that is not specialised has one pipeline for all scenes.
+/// A pass has one pipeline for all features that it does not tell apart.
 fn pipeline_key(shader: &'static Shader, features: SceneFeatures) -> PipelineKey {
-    (shader.id, if shader.overrides.is_empty() { SceneFeatures::ALL } else { features })
+    (shader.id, features.restricted(shader.overrides))
 }
 
 /// How to choose a device.

@@ -55,41 +55,44 @@ pub mod table {
     include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 }
 
-/// Declares the features once: the struct, its extremes, and the WGSL `override` (`scene_has_NAME`) of each.
+/// Declares the features once: the struct, its extremes, and the WGSL `override` of each: `scene_has_NAME` of what a scene
+/// has, `NAME` of a setting.
 macro_rules! scene_features {
-    ($($(#[$meta:meta])* $name:ident,)*) => {
+    (
+        scene { $($(#[$scene_meta:meta])* $scene:ident,)* }
+        settings { $($(#[$setting_meta:meta])* $setting:ident,)* }
+    ) => {
         /// What a scene has, and settings that change code: kernels leave out the code for what is not there.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         pub struct SceneFeatures {
-            $($(#[$meta])* pub $name: bool,)*
-            /// The setting `render.energy_compensation`.
-            pub energy_compensation: bool,
-            /// The setting `render.conserving_mix`.
-            pub conserving_mix: bool,
+            $($(#[$scene_meta])* pub $scene: bool,)*
+            $($(#[$setting_meta])* pub $setting: bool,)*
         }
 
         impl SceneFeatures {
-            /// Everything, with settings at their defaults: right for every scene, fast for few.
-            pub const ALL: Self =
-                SceneFeatures { $($name: true,)* energy_compensation: false, conserving_mix: false };
+            /// Everything, with settings off: right for every scene, fast for few.
+            pub const ALL: Self = SceneFeatures { $($scene: true,)* $($setting: false,)* };
             /// Nothing: single-sided triangles that shine evenly.
-            pub const NONE: Self =
-                SceneFeatures { $($name: false,)* energy_compensation: false, conserving_mix: false };
+            pub const NONE: Self = SceneFeatures { $($scene: false,)* $($setting: false,)* };
 
             /// The names of the `override` declarations.
-            pub const OVERRIDES: &[&str] = &[
-                $(concat!("scene_has_", stringify!($name)),)*
-                "energy_compensation",
-                "conserving_mix",
-            ];
+            pub const OVERRIDES: &[&str] =
+                &[$(concat!("scene_has_", stringify!($scene)),)* $(stringify!($setting),)*];
 
             /// The value of the shader's `override` of this name.
             fn has(self, name: &str) -> bool {
                 match name {
-                    $(concat!("scene_has_", stringify!($name)) => self.$name,)*
-                    "energy_compensation" => self.energy_compensation,
-                    "conserving_mix" => self.conserving_mix,
+                    $(concat!("scene_has_", stringify!($scene)) => self.$scene,)*
+                    $(stringify!($setting) => self.$setting,)*
                     _ => true,
+                }
+            }
+
+            /// Those that a shader with these `override` declarations can tell apart; others are as in [`Self::NONE`].
+            pub fn restricted(self, overrides: &[&str]) -> Self {
+                SceneFeatures {
+                    $($scene: self.$scene && overrides.contains(&concat!("scene_has_", stringify!($scene))),)*
+                    $($setting: self.$setting && overrides.contains(&stringify!($setting)),)*
                 }
             }
         }
@@ -97,50 +100,80 @@ macro_rules! scene_features {
 }
 
 scene_features! {
-    /// Any texture.
-    textures,
-    /// A second texture array.
-    textures_1,
-    /// A third texture array.
-    textures_2,
-    /// A fourth texture array.
-    textures_3,
-    /// Any triangle whose alpha has to be tested.
-    alpha_masks,
-    /// An environment.
-    environment,
-    /// A sun.
-    sun,
-    /// Primitives other than triangles.
-    shapes,
-    /// A pyramid by which the environment is sampled, rather than by its alias table.
-    environment_pyramid,
-    /// Any point, spot or directional light.
-    punctual_lights,
-    /// A top level: more than one mesh that is in world space already.
-    instances,
-    /// Anything that moves.
-    motion,
-    /// More triangles than one storage binding holds.
-    many_triangles,
-    /// Any material that transmits light.
-    transmission,
-    /// Any material that bounds a medium.
-    volumes,
-    /// Any medium that bends colours apart.
-    dispersion,
-    /// Any material without lighting.
-    unlit,
-    /// Any material with highlights stretched along a direction.
-    anisotropy,
-    /// Any material whose dielectric reflection is not that of index 1.5.
-    specular,
-    /// Any material with sheen.
-    sheen,
-    /// Any material with a clearcoat.
-    clearcoat,
-    /// Any material with a thin film.
-    iridescence,
+    scene {
+        /// Any texture.
+        textures,
+        /// A second texture array.
+        textures_1,
+        /// A third texture array.
+        textures_2,
+        /// A fourth texture array.
+        textures_3,
+        /// Any triangle whose alpha has to be tested.
+        alpha_masks,
+        /// An environment.
+        environment,
+        /// A sun.
+        sun,
+        /// Primitives other than triangles.
+        shapes,
+        /// A pyramid by which the environment is sampled, rather than by its alias table.
+        environment_pyramid,
+        /// Any point, spot or directional light.
+        punctual_lights,
+        /// A top level: more than one mesh that is in world space already.
+        instances,
+        /// Anything that moves.
+        motion,
+        /// More triangles than one storage binding holds.
+        many_triangles,
+        /// Any material that transmits light.
+        transmission,
+        /// Any material that bounds a medium.
+        volumes,
+        /// Any medium that bends colours apart.
+        dispersion,
+        /// Any material without lighting.
+        unlit,
+        /// Any material with highlights stretched along a direction.
+        anisotropy,
+        /// Any material whose dielectric reflection is not that of index 1.5.
+        specular,
+        /// Any material with sheen.
+        sheen,
+        /// Any material with a clearcoat.
+        clearcoat,
+        /// Any material with a thin film.
+        iridescence,
+    }
+    settings {
+        /// `render.energy_compensation`.
+        energy_compensation,
+        /// `render.conserving_mix`.
+        conserving_mix,
+        /// Lights chosen by search in the cumulative distribution (src/techniques/candidates.rs).
+        light_choice_cdf,
+        /// Lights chosen all alike.
+        light_choice_uniform,
+        /// Candidates drawn for the BSDF.
+        bsdf_candidates,
+        /// Reservoirs in three words instead of four.
+        reservoirs_packed,
+        /// Reuse weights 1/M (src/techniques/reuse.rs).
+        reuse_constant,
+        /// Joining reservoirs of all neighbours, however different.
+        reuse_everything,
+        /// Reuse weights 1/|Z|.
+        reuse_valid,
+        /// Pairwise reuse weights.
+        reuse_pairwise,
+        /// Their defensive variant.
+        reuse_defensive,
+        /// Visibility as a factor of target functions in reuse weights.
+        reuse_visibility,
+        /// Whether what a reservoir holds is known to be lit where it is held.
+        reservoirs_are_visible,
+    }
 }
 
 /// A pipeline and the layouts its bind groups are made with.

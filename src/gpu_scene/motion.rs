@@ -108,7 +108,7 @@ impl Motion {
         self.now = 1 - self.now;
         for (i, (body, places)) in stage.bodies.iter().zip(&self.places).enumerate() {
             let upload = |(root, first): (u32, u32), nodes: &[BvhNode], triangles: &[Triangle], attributes: &[_]| {
-                write_nodes(gpu, device, root, &wide::collapse(nodes, 0, root, first).nodes);
+                write_nodes(gpu, device, root, &wide::collapse_refitted(nodes, 0, root, first).nodes);
                 device.write_triangles(gpu, first, triangles);
                 device.attributes.write(gpu, u64::from(first) * ATTRIBUTE_TEXELS, attributes);
             };

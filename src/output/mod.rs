@@ -2,22 +2,22 @@
 
 #[cfg(not(target_arch = "wasm32"))]
 pub mod atomic;
+#[cfg(not(target_arch = "wasm32"))]
 pub mod exr;
 pub mod png;
 
-pub use exr::{ExrPicture, decode_exr, encode_exr};
 pub use png::encode_png;
 #[cfg(not(target_arch = "wasm32"))]
 pub use {
     atomic::{check_writable, write_atomic},
-    exr::read_exr,
+    exr::{ExrPicture, decode_exr, encode_exr, read_exr},
     png::write_png,
 };
 
 use crate::error::{Error, Result};
 
 /// The largest width and height of a picture that is read, written or rendered.
-pub const MAX_SIDE: u32 = 16384;
+pub const MAX_SIDE: u32 = restir_decoders::map::MAX_SIDE;
 
 /// A picture: linear Rec. 709 radiance, row-major from the top.
 #[derive(Debug, Clone, PartialEq)]

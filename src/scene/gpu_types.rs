@@ -430,8 +430,8 @@ pub struct Light {
     pub instance: u32,
     /// Index of this light as it was in the previous frame: its twin, or itself. Not read of emissive triangles.
     pub previous: u32,
-    /// Unused.
-    pub padding: u32,
+    /// Cumulative distribution, of 2^32: the probabilities of all lights before this one.
+    pub cumulative: u32,
 }
 }
 

@@ -28,7 +28,7 @@ pub fn load_bytes(name: &str, bytes: &[u8], resolve: gltf::Resolve) -> Result<Sc
     };
     let converted = restir_decoders::obj::to_glb(bytes, &mut find).map_err(|fault| match fault {
         gltf::Fault::Broken(what) => Error::bad_file(name, "OBJ", what),
-        gltf::Fault::Unsupported(what) => Error::Unsupported { file: name.to_owned(), what },
+        other => Error::of_fault(name, other),
     })?;
     let mut scene = gltf::load_bytes(name, &converted.glb, resolve)?;
     scene.warnings.splice(0..0, converted.warnings);

@@ -3,12 +3,13 @@
 //! The frame before is a whole scene of its own, with transforms, shapes, lights and both levels of its BVH, so that
 //! temporal reuse can rebuild and trace it exactly.
 
+use super::area_light::keeps_spheres;
 use super::flat::FlatScene;
 use super::flat::deformers::{Deformer, write_shape};
 use super::gpu_types::{BvhNode, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, NONE, Triangle, TriangleAttributes};
 use super::rig::Pose;
 use super::rig::deform::Deformed;
-use super::{Camera, bvh};
+use super::{Camera, Shape as Primitive, bvh};
 use glam::{Mat4, Vec3};
 use std::ops::Range;
 
@@ -153,8 +154,12 @@ impl Stage {
         self.version += 1;
         self.pose = scene.rig.pose(clip, time);
         for placement in &scene.rig.instances {
+            let moved = self.pose.instance(placement);
             if let Some(transform) = self.transforms.get_mut(placement.instance as usize) {
-                *transform = self.pose.instance(placement);
+                // A light that would be no sphere any more stays where it was.
+                if keeps_spheres(moved) || !is_sphere(scene, placement.instance) {
+                    *transform = moved;
+                }
             }
         }
         for attached in &scene.rig.lights {
@@ -184,6 +189,13 @@ impl Stage {
             |attached| camera.at(&self.pose.node(attached.node)).filter(|camera| camera.position.is_finite()),
         )
     }
+}
+
+/// Whether an instance is a spherical light.
+fn is_sphere(scene: &FlatScene, instance: u32) -> bool {
+    let mesh = scene.instances.get(instance as usize).and_then(|instance| scene.meshes.get(instance.mesh as usize));
+    let triangle = mesh.and_then(|mesh| scene.triangles.get(mesh.first_triangle as usize));
+    triangle.is_some_and(|triangle| triangle.shape() == Primitive::Sphere)
 }
 
 impl Body {

@@ -1,8 +1,12 @@
 //! Rendering methods and their registry. To add one: its shader folder, its file here, one line in [`ALL`], one docs page.
 
+pub mod candidates;
 mod normals;
 mod path_tracer;
 mod restir_di;
+mod restir_di_decoupled;
+mod restir_report;
+pub mod reuse;
 mod ris;
 
 use crate::error::{Error, Result};
@@ -90,7 +94,14 @@ pub trait Technique {
 }
 
 /// Every technique, in the order of menus.
-pub static ALL: &[&TechniqueInfo] = &[&restir_di::INFO, &ris::INFO, &path_tracer::INFO, &normals::INFO];
+pub static ALL: &[&TechniqueInfo] = &[
+    &restir_di::INFO,
+    &restir_di_decoupled::INFO,
+    &restir_report::INFO,
+    &ris::INFO,
+    &path_tracer::INFO,
+    &normals::INFO,
+];
 
 /// The technique with this id.
 ///

@@ -1,7 +1,7 @@
 //! `restir-di`: spatiotemporal reservoir resampling of direct light, as Bitterli et al. 2020 with the switches of thesis
 //! 001, section 5.1.
 
-use super::{Technique, TechniqueInfo};
+use super::{Technique, TechniqueInfo, candidates, reuse};
 use crate::error::Result;
 use crate::gpu::{Gpu, recorder::Recorder, shader::table};
 use crate::params::Params;
@@ -26,38 +26,64 @@ crate::params! {
     pub struct RestirDiParams {
         /// Light samples that a pixel's initial reservoir is resampled from, M. Higher: less noise from many lights, more time. Unbiased at any value.
         light_samples: uint(32, 1..=1024, "samples"),
-        /// Trace a shadow ray for the initial sample and pass it on only if it is lit. On: less noise in shadow; biased (darker) unless bias_correction is mis-visibility.
+        /// Rays drawn for the BSDF of a pixel that add what they run into to its candidates, weighed by the balance heuristic. Higher: sharp reflections of large lights get less noise; a ray each, and every light sample costs more. Unbiased at any value.
+        bsdf_samples: uint(0, 0..=16, "rays"),
+        /// How light samples choose a light. alias: by power, in constant time. cdf: by power, in a time that grows with the logarithm of the number of lights. uniform: all alike, which is noisier where they differ. Unbiased either way.
+        light_choice: choice(0, crate::techniques::candidates::LIGHT_CHOICES),
+        /// With a reservoir_size of 4: whether each reservoir has candidates of its own (four times the time, samples that differ more) or all four select from the same. Unbiased either way.
+        stratified: flag(false),
+        /// Trace a shadow ray for the initial sample and pass it on only if it is lit. On: less noise in shadow; biased (darker) unless visibility_in_weights is on.
         visibility_reuse: flag(true),
-        /// Join the reservoir of the same point in the previous frame. On: far less noise, frames become correlated. Its bias is that of bias_correction.
+        /// Join the reservoir of the same point in the previous frame. On: far less noise, frames become correlated. Its bias is that of reuse_weights.
         temporal_reuse: flag(true),
         /// Largest confidence weight of the history, in frames. Higher: less noise, slower to follow change. Unbiased at any value.
         history_cap: float(20.0, 0.0..=1000.0, "frames"),
-        /// Largest distance between a point and its history, as a fraction of the distance to the camera. Higher: history is kept on thin and moving things, more smearing. Adds no bias with mis-visibility.
+        /// Largest distance between a point and its history, as a fraction of the distance to the camera. Higher: history is kept on thin and moving things, more smearing. Adds no bias to unbiased reuse_weights.
         temporal_position_threshold: float(0.05, 0.0..=10.0, "of distance"),
-        /// Smallest cosine between the normals of a point and its history. Lower: more history on curved things. Adds no bias with mis-visibility.
+        /// Smallest cosine between the normals of a point and its history. Lower: more history on curved things. Adds no bias to unbiased reuse_weights.
         temporal_normal_threshold: float(0.9, -1.0..=1.0, "cosine"),
-        /// Largest difference between the albedos of a point and its history. Higher: history crosses texture edges. Adds no bias with mis-visibility.
+        /// Largest difference between the albedos of a point and its history. Higher: history crosses texture edges. Adds no bias to unbiased reuse_weights.
         temporal_albedo_threshold: float(0.25, 0.0..=1.0, ""),
-        /// Join the reservoirs of neighbouring pixels. On: less noise, neighbours become correlated. Its bias is that of bias_correction.
+        /// Take the history of another pixel in the same block of 4 x 4, a different one each frame. On: neighbours whose histories are alike come apart, which denoisers like; more noise at edges. Adds no bias to unbiased reuse_weights.
+        temporal_permutation: flag(false),
+        /// Throw away reservoirs whose estimate is far above the mean of their 8 x 8 pixels: above ten times it near 0, above the mean itself at 1; 0 throws nothing away. Higher: fewer bright specks that stay, and darker. Biased (darker) above 0.
+        boiling_filter: float(0.0, 0.0..=1.0, ""),
+        /// Join the reservoirs of neighbouring pixels. On: less noise, neighbours become correlated. Its bias is that of reuse_weights.
         spatial_reuse: flag(true),
-        /// How often spatial reuse runs. Higher: samples travel further, more time. Unbiased at any value with mis-visibility.
+        /// How often spatial reuse runs. Higher: samples travel further, more time. Adds no bias to unbiased reuse_weights.
         spatial_iterations: uint(1, 1..=4, "passes"),
-        /// Neighbours that each iteration joins. Higher: less noise, more time. Unbiased at any value with mis-visibility.
+        /// Neighbours that each iteration joins. Higher: less noise, more time. Adds no bias to unbiased reuse_weights.
         spatial_neighbors: uint(4, 1..=16, "pixels"),
-        /// How far neighbours lie at most. Higher: more different samples, less alike surfaces. Unbiased at any value with mis-visibility.
+        /// Neighbours that a pixel without history joins, if more than spatial_neighbors. Higher: less noise where something came into view, more time there. Adds no bias to unbiased reuse_weights.
+        disocclusion_neighbors: uint(0, 0..=16, "pixels"),
+        /// How many pixels are looked at for each neighbour that is wanted, until enough are found that are like the pixel. Higher: fewer pixels stay without neighbours, more time. Adds no bias, for only surfaces are looked at.
+        spatial_retries: uint(1, 1..=8, "tries"),
+        /// Where in their disk neighbours are looked for: each at random, or together at the points of a low-discrepancy sequence (R2) that is turned at random for every pixel, which spreads them evenly. Adds no bias.
+        spatial_pattern: choice(0, ["random", "low-discrepancy"]),
+        /// How far neighbours lie at most. Higher: more different samples, less alike surfaces. Adds no bias to unbiased reuse_weights.
         spatial_radius: float(30.0, 1.0..=256.0, "pixels"),
-        /// Largest depth difference to a neighbour, relative. Higher: reuse across steps in depth. Adds no bias with mis-visibility.
+        /// Largest depth difference to a neighbour, relative. Higher: reuse across steps in depth. Adds no bias to unbiased reuse_weights.
         spatial_depth_threshold: float(0.1, 0.0..=10.0, "of depth"),
-        /// Smallest cosine between the normals of a pixel and its neighbour. Lower: reuse round corners. Adds no bias with mis-visibility.
+        /// Smallest cosine between the normals of a pixel and its neighbour. Lower: reuse round corners. Adds no bias to unbiased reuse_weights.
         spatial_normal_threshold: float(0.9, -1.0..=1.0, "cosine"),
+        /// Largest difference to a neighbour in base colour, metalness or roughness squared; 1 allows all. Higher: reuse across the edges of materials. Adds no bias to unbiased reuse_weights.
+        spatial_material_threshold: float(1.0, 0.0..=1.0, ""),
+        /// Largest confidence weight of a neighbour. Higher: neighbours with a long history count for more. Lower: the pixel's own sample does. Unbiased at any value.
+        spatial_cap: float(10000.0, 0.0..=10000.0, "frames"),
         /// Spatial reuse is for pixels whose own confidence weight is below this, as after a disocclusion: a neighbour's one sample, however sure, is noise beside a long history. Higher: more pixels reuse; above history_cap + 1 all do, as in Bitterli et al. 2020. Lower: less time. Adds no bias, for confidence does not depend on samples.
         spatial_confidence_limit: float(8.0, 0.0..=10000.0, "frames"),
-        /// Make what spatial reuse found the next frame's history, as Bitterli et al. 2020. On: samples spread further; neighbours become correlated, and what noise they bring stays. Unbiased either way with mis-visibility.
+        /// Make what spatial reuse found the next frame's history, as Bitterli et al. 2020. On: samples spread further; neighbours become correlated, and what noise they bring stays. Adds no bias to unbiased reuse_weights.
         spatial_feedback: flag(false),
         /// Samples that a pixel keeps. 4: less noise, four times the memory and shadow rays. Unbiased either way.
         reservoir_size: choice(0, ["1", "4"]),
-        /// How joined reservoirs are weighted. none divides by all confidence (1/M) and is biased; 1/z divides by that of pixels that could have made the sample, mis weights by the balance heuristic, and both are biased while visibility_reuse is on; mis-visibility traces shadow rays and is unbiased.
-        bias_correction: choice(3, ["none", "1/z", "mis", "mis-visibility"]),
+        /// How a reservoir is kept: in f32 16 bytes, or packed in 12, where a contribution weight is rounded to 1/8192 and a confidence weight to 1/128 of itself. Packed: a quarter less memory; the same picture but for that rounding.
+        reservoir_format: choice(0, ["f32", "packed"]),
+        /// In which order pixels lie in memory: by rows, by columns, or in tiles of 2 to 40 pixels a side. The same picture; which is fastest depends on the device.
+        pixel_order: choice(0, ["rows", "columns", "tiles-2", "tiles-4", "tiles-8", "tiles-16", "tiles-40"]),
+        /// How joined reservoirs are weighted. constant (1/M, every neighbour) and heuristics (1/M, after rejection by depth, normal and material) are biased whatever else is set and trace no rays; 1/z divides by the confidence of pixels that could have made the sample, balance weighs them by how likely they were to, pairwise each neighbour against the pixel alone, defensive likewise with a share kept for the pixel's own sample (of neighbours; history is joined pairwise): unbiased with visibility_in_weights, or without visibility_reuse. Time goes with the square of neighbours for 1/z and balance, with their number for pairwise and defensive.
+        reuse_weights: choice(5, crate::techniques::reuse::WEIGHTS),
+        /// Trace shadow rays for reuse weights, in vain for constant and heuristics. Of k joined reservoirs, at most k(k - 1) rays for 1/z and balance and 2(k - 1) for pairwise and defensive; without visibility_reuse k more. On: unbiased. Off: faster, and too dark at the edges of shadows while visibility_reuse is on.
+        visibility_in_weights: flag(true),
         /// Add indirect light from the path tracer's later bounces. Off: direct light only, faster, and darker than the truth.
         indirect: flag(true),
     }
@@ -69,16 +95,40 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
     summary: "Direct light by spatiotemporal reservoir resampling, indirect light by path tracing.",
     papers: &["Bitterli et al. 2020", "thesis 001, section 5", "Lin 2022 (dissertation), chapter 6 for conventions"],
     unbiased: true,
-    bias: "Unbiased with bias_correction = mis-visibility (the default). none is biased towards dark; 1/z and mis are while \
-           visibility_reuse is on, where visibility differs between the pixels that share samples.",
+    bias: "Unbiased by default. reuse_weights = constant and heuristics are biased towards dark; the others are with \
+           visibility_reuse but without visibility_in_weights, where visibility differs between pixels that share samples. \
+           boiling_filter above 0 darkens what is bright.",
     params: RestirDiParams::SPECS,
-    views: &["direct", "indirect", "contribution weight", "confidence weight", "light"],
+    views: &["direct", "indirect", "contribution weight", "confidence weight", "light", "duplicates"],
     layouts: &[Reservoir::LAYOUT, RestirDiParams::LAYOUT],
     create: |gpu| Box::new(RestirDi::new(gpu)),
 };
 
 /// Most spatial iterations; each has a uniform that says which it is.
 const MAXIMUM_ITERATIONS: u32 = 4;
+
+impl RestirDiParams {
+    /// Reservoirs of a pixel.
+    fn slots(&self) -> u32 {
+        if self.reservoir_size == 1 { 4 } else { 1 }
+    }
+
+    fn is_packed(&self) -> bool {
+        self.reservoir_format == 1
+    }
+
+    /// 32-bit words of a reservoir buffer; `shaders/techniques/restir-di/reservoirs.wgsl` addresses them.
+    fn reservoir_words(&self, size: UVec2) -> u64 {
+        let side = match self.pixel_order {
+            0 | 1 => 1,
+            6 => 40,
+            order => 1 << (order - 1),
+        };
+        let pixels = u64::from(size.x.next_multiple_of(side)) * u64::from(size.y.next_multiple_of(side));
+        // Shaders read words by four.
+        (pixels * u64::from(self.slots()) * if self.is_packed() { 3 } else { 4 }).next_multiple_of(4)
+    }
+}
 
 struct RestirDi {
     params: RestirDiParams,
@@ -89,7 +139,7 @@ struct RestirDi {
 
 /// What depends on picture size and reservoir size.
 struct Buffers {
-    made_for: (UVec2, u32),
+    made_for: (UVec2, u64),
     /// Two to write to and fro within a frame, and the history: rotated, never copied.
     reservoirs: [wgpu::Buffer; 3],
     /// Which of them holds the previous frame's final reservoirs.
@@ -123,6 +173,12 @@ impl Technique for RestirDi {
     }
 
     fn set(&mut self, name: &str, value: &str) -> Result<bool> {
+        if name == reuse::OLD_NAME {
+            for (name, value) in reuse::from_old(value)? {
+                self.params.set(name, value)?;
+            }
+            return Ok(true);
+        }
         self.params.set(name, value)
     }
 
@@ -132,15 +188,15 @@ impl Technique for RestirDi {
 
     fn prepare(&mut self, gpu: &Gpu, size: UVec2) -> Result<()> {
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&self.params));
-        let slots = if self.params.reservoir_size == 1 { 4 } else { 1 };
-        if let Some(buffers) = self.buffers.as_mut().filter(|b| b.made_for == (size, slots)) {
+        let (slots, words) = (self.params.slots(), self.params.reservoir_words(size));
+        if let Some(buffers) = self.buffers.as_mut().filter(|b| b.made_for == (size, words)) {
             buffers.has_history = false;
             return Ok(());
         }
-        let bytes = u64::from(size.x) * u64::from(size.y) * u64::from(slots) * std::mem::size_of::<Reservoir>() as u64;
-        let make = || gpu.storage(&format!("restir-di reservoirs ({slots} a pixel at {}x{})", size.x, size.y), bytes);
+        let what = format!("restir-di reservoirs ({slots} a pixel at {}x{})", size.x, size.y);
+        let make = || gpu.storage(&what, 4 * words);
         self.buffers = Some(Buffers {
-            made_for: (size, slots),
+            made_for: (size, words),
             reservoirs: [make()?, make()?, make()?],
             history: 2,
             has_history: false,
@@ -151,23 +207,48 @@ impl Technique for RestirDi {
 
     fn record(&mut self, recorder: &mut Recorder<'_>, size: UVec2) -> Result<()> {
         let Some(buffers) = &mut self.buffers else { return Ok(()) };
+        reuse::specialise(
+            &mut recorder.features,
+            self.params.reuse_weights,
+            self.params.visibility_in_weights == 1,
+            self.params.visibility_reuse == 1,
+        );
         let reservoirs = &buffers.reservoirs;
         let history = buffers.history;
         let mut current = (history + 1) % 3;
         let mut spare = (history + 2) % 3;
 
+        recorder.features.reservoirs_packed = self.params.is_packed();
+        let features = recorder.features;
+        candidates::specialise(&mut recorder.features, self.params.light_choice, self.params.bsdf_samples);
         recorder
             .pass(&table::RESTIR_DI_INITIAL)
             .bind("params", &self.uniform)
             .bind("reservoirs_out", &reservoirs[current])
             .dispatch_over(size)?;
+        // Indirect light draws its lights as the path tracer does.
+        recorder.features = features;
         // Without a history the pass would only copy; and the first picture need not wait for its pipeline.
         if self.params.temporal_reuse == 1 && buffers.has_history {
+            // Of two reservoirs pairwise weights are the balance heuristic; a share kept for the newer one would only make the
+            // history shorter.
+            let features = recorder.features;
+            recorder.features.reuse_defensive = false;
             recorder
                 .pass(&table::RESTIR_DI_TEMPORAL)
                 .bind("params", &self.uniform)
                 .bind("reservoirs", &reservoirs[current])
                 .bind("reservoirs_previous", &reservoirs[history])
+                .bind("reservoirs_out", &reservoirs[spare])
+                .dispatch_over(size)?;
+            recorder.features = features;
+            std::mem::swap(&mut current, &mut spare);
+        }
+        if self.params.boiling_filter > 0.0 {
+            recorder
+                .pass(&table::RESTIR_DI_BOILING)
+                .bind("params", &self.uniform)
+                .bind("reservoirs", &reservoirs[current])
                 .bind("reservoirs_out", &reservoirs[spare])
                 .dispatch_over(size)?;
             std::mem::swap(&mut current, &mut spare);

@@ -55,6 +55,8 @@ pub mod functions {
     pub const POINTS: u32 = 14;
     pub const CLASSIFY: u32 = 15;
     pub const BITS_BELOW: u32 = 16;
+    pub const UNWARPED: u32 = 17;
+    pub const PACKED: u32 = 18;
 }
 
 /// Operations of `shaders/tests/scene_functions.wgsl`.

@@ -30,13 +30,22 @@ fn target_function(surface: Surface, sample: LightSample, previous: bool) -> f32
     return luminance(direct_scatter(surface, light.direction, light.distance) * light.value);
 }
 
-// Resampling weight w = m p-hat / p of one candidate, with m = 1 / M for M candidates of one kind.
-fn candidate_weight(surface: Surface, sample: LightSample, candidate_count: u32) -> f32 {
-    let pdf = light_sample_pdf(surface.position, sample);
-    if pdf <= 0.0 {
+// Whether there are BSDF samples among the candidates, fixed when a pipeline is made (src/techniques/candidates.rs).
+override bsdf_candidates: bool = false;
+
+// Resampling weight w = m p-hat / p of a candidate of either kind, with the balance heuristic m over `light_samples` light
+// samples and `bsdf_samples` BSDF samples, all densities in the measure of the sample's light (thesis 000, listing 3).
+fn candidate_weight(surface: Surface, sample: LightSample, light_samples: u32, bsdf_samples: u32) -> f32 {
+    if sample.light == NONE {
         return 0.0;
     }
-    return target_function(surface, sample, false) / (pdf * f32(candidate_count));
+    let light = light_contribution(sample, surface.position, false);
+    let value = luminance(direct_scatter(surface, light.direction, light.distance) * light.value);
+    var density = f32(light_samples) * light_sample_pdf(surface.position, sample);
+    if bsdf_candidates {
+        density += f32(bsdf_samples) * light_hit_sample_pdf(sample, light, surface_pdf(surface, light.direction));
+    }
+    return select(0.0, value / density, value > 0.0 && density > 0.0);
 }
 
 // W of a stream's selected sample: its weight sum over its target function; zero where nothing was selected. A quotient

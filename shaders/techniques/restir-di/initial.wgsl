@@ -1,39 +1,26 @@
-// Initial candidates and visibility reuse.
+// Initial candidates, of lights and of the BSDF, and visibility reuse.
 // One invocation: one pixel. Reads the visibility buffer and the scene. Writes the pixel's reservoirs (1 or 4 slots),
 // each with confidence weight 1: one frame's worth of candidates.
-// Source: Bitterli et al. 2020, Algorithm 3 and Algorithm 5, lines 2 to 7; thesis 001, section 5.3.1.
+// Source: Bitterli et al. 2020, Algorithm 3 and Algorithm 5, lines 2 to 7; thesis 001, section 5.3.1; thesis
+// 000, listing 3.
 #include "scene/visibility_buffer.wgsl"
 #include "scene/counters.wgsl"
-#include "techniques/common/resampling.wgsl"
-#include "techniques/restir-di/params.wgsl"
-
-@group(1) @binding(4) var<storage, read_write> reservoirs_out: array<Reservoir>;
+#include "techniques/common/candidates.wgsl"
+#include "techniques/restir-di/reservoirs.wgsl"
 
 fn sample_pixel(pixel: vec2u) {
     let slots = slot_count();
     let lit = pixel_has_surface(pixel) && frame.light_count > 0u;
     if !lit {
         for (var slot = 0u; slot < slots; slot += 1u) {
-            reservoirs_out[reservoir_index(pixel, slot)] = reservoir_empty();
+            store_reservoir(pixel, slot, reservoir_empty());
         }
         return;
     }
     let surface = load_pixel(pixel);
     var rng = rng_new(pixel, frame.index, frame.seed, STREAM_INITIAL);
-    // Every slot resamples the same candidates with its own random numbers.
-    var streams = array<Stream, MAXIMUM_RESERVOIR_SIZE>(
-        stream_empty(), stream_empty(), stream_empty(), stream_empty());
-    for (var i = 0u; i < params.light_samples; i += 1u) {
-        let sample = light_sample(surface.position, &rng);
-        let weight = candidate_weight(surface, sample, params.light_samples);
-        let u = random_4(&rng);
-        for (var slot = 0u; slot < slots; slot += 1u) {
-            // By way of a copy: naga cannot pass a pointer to a dynamically indexed element.
-            var stream = streams[slot];
-            stream_update(&stream, sample, weight, u[slot]);
-            streams[slot] = stream;
-        }
-    }
+    let settings = CandidateSettings(params.light_samples, params.bsdf_samples, slots, params.stratified);
+    select_candidates(surface, settings, &rng);
     for (var slot = 0u; slot < slots; slot += 1u) {
         let sample = streams[slot].selected;
         var weight = stream_contribution_weight(streams[slot], target_function(surface, sample, false));
@@ -41,7 +28,7 @@ fn sample_pixel(pixel: vec2u) {
         if weight > 0.0 && params.visibility_reuse == 1u && !sample_is_visible(surface, sample, false) {
             weight = 0.0;
         }
-        reservoirs_out[reservoir_index(pixel, slot)] = Reservoir(sample.light, sample.point, weight, 1.0);
+        store_reservoir(pixel, slot, Reservoir(sample.light, sample.point, weight, 1.0));
     }
 }
 

@@ -5,17 +5,17 @@
 #include "scene/visibility_buffer.wgsl"
 #include "scene/counters.wgsl"
 #include "techniques/common/resampling.wgsl"
-#include "techniques/restir-di/params.wgsl"
+#include "techniques/restir-di/reservoirs.wgsl"
 
 @group(1) @binding(2) var radiance_out: texture_storage_2d<rgba32float, write>;
-@group(1) @binding(4) var<storage, read> reservoirs: array<Reservoir>;
-@group(1) @binding(5) var indirect_radiance: texture_2d<f32>;
+@group(1) @binding(7) var indirect_radiance: texture_2d<f32>;
 
 const VIEW_DIRECT = 1u;
 const VIEW_INDIRECT = 2u;
 const VIEW_CONTRIBUTION_WEIGHT = 3u;
 const VIEW_CONFIDENCE_WEIGHT = 4u;
 const VIEW_LIGHT = 5u;
+const VIEW_DUPLICATES = 6u;
 
 // A colour a light can be told by.
 fn light_color(light: u32) -> vec3f {
@@ -23,6 +23,29 @@ fn light_color(light: u32) -> vec3f {
         return vec3f(0.0);
     }
     return vec3f(pcg4d(vec4u(light, 1u, 2u, 3u)).xyz >> vec3u(8u)) * 5.9604645e-8;
+}
+
+// How many of the pixels within `DUPLICATES_RADIUS` hold the very sample that this one holds, as a share of them: black where
+// none does, over red and yellow to white where all do (Wyman and Panteleev 2021, Figure 9).
+const DUPLICATES_RADIUS = 5;
+
+fn duplicates_color(pixel: vec2u, own: Reservoir) -> vec3f {
+    var count = 0u;
+    var pixels = 0u;
+    for (var y = -DUPLICATES_RADIUS; y <= DUPLICATES_RADIUS; y += 1) {
+        for (var x = -DUPLICATES_RADIUS; x <= DUPLICATES_RADIUS; x += 1) {
+            let other = vec2i(pixel) + vec2i(x, y);
+            if any(other < vec2i(0)) || any(other >= vec2i(frame.size)) || (x == 0 && y == 0) {
+                continue;
+            }
+            let reservoir = load_reservoir(vec2u(other), 0u);
+            pixels += 1u;
+            count += u32(reservoir.light == own.light && reservoir.point == own.point && own.light != NONE
+                && reservoir.unbiased_contribution_weight > 0.0);
+        }
+    }
+    let heat = 3.0 * sqrt(f32(count) / f32(max(pixels, 1u)));
+    return clamp(vec3f(heat, heat - 1.0, heat - 2.0), vec3f(0.0), vec3f(1.0));
 }
 
 fn indirect_light(pixel: vec2u) -> vec3f {
@@ -38,7 +61,7 @@ fn pixel_radiance(pixel: vec2u) -> vec3f {
     }
     let surface = load_pixel(pixel);
     let slots = slot_count();
-    let first = reservoirs[reservoir_index(pixel, 0u)];
+    let first = load_reservoir(pixel, 0u);
     switch frame.view {
         case VIEW_INDIRECT: { return indirect_light(pixel); }
         // W times p-hat is the estimate itself up to visibility, hence dimensionless enough to look at.
@@ -51,11 +74,12 @@ fn pixel_radiance(pixel: vec2u) -> vec3f {
             return vec3f(first.confidence_weight / ((params.history_cap + 1.0) * (1.0 + neighbors)));
         }
         case VIEW_LIGHT: { return light_color(first.light); }
+        case VIEW_DUPLICATES: { return duplicates_color(pixel, first); }
         default: {}
     }
     var direct = vec3f(0.0);
     for (var slot = 0u; slot < slots; slot += 1u) {
-        direct += shade_reservoir(surface, reservoirs[reservoir_index(pixel, slot)]);
+        direct += shade_reservoir(surface, load_reservoir(pixel, slot));
     }
     direct /= f32(slots);
     if frame.view == VIEW_DIRECT {

@@ -1,18 +1,18 @@
 // Spatial reuse: reservoirs of random pixels within a radius join the pixel's own.
 // One invocation: one pixel. Reads the visibility buffer and the reservoirs of the pass before. Writes the combined
 // reservoirs. Run once an iteration, `pass_index.value` counting from 0.
-// Source: Bitterli et al. 2020, Algorithm 5, lines 13 to 19; thesis 001, section 5.4 (depth and normal thresholds).
+// Source: Bitterli et al. 2020, Algorithm 5, lines 13 to 19; thesis 001, section 5.4 (depth and normal thresholds); thesis
+// 000, section 4.5.4 (retries); Wyman and Panteleev 2021, section 6.4 (more neighbours without history).
 #include "scene/visibility_buffer.wgsl"
 #include "scene/counters.wgsl"
-#include "techniques/restir-di/combine.wgsl"
+#include "techniques/common/combine.wgsl"
+#include "techniques/restir-di/reservoirs.wgsl"
 
 struct PassIndex {
     value: u32,
 }
 
-@group(1) @binding(4) var<storage, read> reservoirs: array<Reservoir>;
-@group(1) @binding(5) var<storage, read_write> reservoirs_out: array<Reservoir>;
-@group(1) @binding(6) var<uniform> pass_index: PassIndex;
+@group(1) @binding(7) var<uniform> pass_index: PassIndex;
 
 fn view_depth(position: vec3f) -> f32 {
     return dot(position - frame.camera.position, frame.camera.forward);
@@ -20,17 +20,40 @@ fn view_depth(position: vec3f) -> f32 {
 
 // Whether a neighbour is like enough to help. It looks only at surfaces, never at samples, so it adds no bias.
 fn is_similar(surface: Surface, neighbor: Surface) -> bool {
+    if reuse_everything {
+        return true;
+    }
     let depth = view_depth(surface.position);
+    let color = abs(surface.bsdf.base_color - neighbor.bsdf.base_color);
+    let shine = max(abs(surface.bsdf.metallic - neighbor.bsdf.metallic), length(surface.bsdf.alpha - neighbor.bsdf.alpha));
     return abs(view_depth(neighbor.position) - depth) <= params.spatial_depth_threshold * abs(depth)
-        && dot(surface.basis.normal, neighbor.basis.normal) >= params.spatial_normal_threshold;
+        && dot(surface.basis.normal, neighbor.basis.normal) >= params.spatial_normal_threshold
+        && max(max(color.r, color.g), max(color.b, shine)) <= params.spatial_material_threshold;
+}
+
+// The i-th of a pixel's points of the unit square: independent, or those of the R2 sequence (Roberts 2018), turned by
+// `start`.
+fn neighbor_point(i: u32, start: vec2f, rng: ptr<function, Rng>) -> vec2f {
+    if params.spatial_pattern == SPATIAL_PATTERN_LOW_DISCREPANCY {
+        return fract(start + f32(i) * vec2f(0.7548776662, 0.5698402910));
+    }
+    return random_2(rng);
+}
+
+fn keep(pixel: vec2u) {
+    for (var slot = 0u; slot < slot_count(); slot += 1u) {
+        keep_reservoir(pixel, slot);
+    }
 }
 
 fn reuse_pixel(pixel: vec2u) {
-    if !pixel_has_surface(pixel)
-        || reservoirs[reservoir_index(pixel, 0u)].confidence_weight >= params.spatial_confidence_limit {
-        for (var slot = 0u; slot < slot_count(); slot += 1u) {
-            reservoirs_out[reservoir_index(pixel, slot)] = reservoirs[reservoir_index(pixel, slot)];
-        }
+    if !pixel_has_surface(pixel) {
+        keep(pixel);
+        return;
+    }
+    let confidence_weight = load_reservoir(pixel, 0u).confidence_weight;
+    if confidence_weight >= params.spatial_confidence_limit {
+        keep(pixel);
         return;
     }
     let surface = load_pixel(pixel);
@@ -40,8 +63,16 @@ fn reuse_pixel(pixel: vec2u) {
     var domains: array<vec2u, MAXIMUM_DOMAINS>;
     domains[0] = pixel;
     var found = 1u;
-    for (var i = 0u; i < params.spatial_neighbors; i += 1u) {
-        let offset = sample_disk(random_2(&rng)) * params.spatial_radius;
+    var wanted = params.spatial_neighbors;
+    if confidence_weight <= 1.0 {
+        wanted = max(wanted, params.disocclusion_neighbors);
+    }
+    var start = vec2f(0.0);
+    if params.spatial_pattern == SPATIAL_PATTERN_LOW_DISCREPANCY {
+        start = random_2(&rng);
+    }
+    for (var i = 0u; i < wanted * params.spatial_retries && found <= wanted; i += 1u) {
+        let offset = sample_disk(neighbor_point(i, start, &rng)) * params.spatial_radius;
         let candidate = vec2i(floor(vec2f(pixel) + 0.5 + offset));
         if any(candidate < vec2i(0)) || any(candidate >= vec2i(frame.size)) || all(candidate == vec2i(pixel)) {
             continue;
@@ -56,13 +87,16 @@ fn reuse_pixel(pixel: vec2u) {
     for (var slot = 0u; slot < slot_count(); slot += 1u) {
         combination_begin();
         for (var j = 0u; j < found; j += 1u) {
-            combination_offer(reservoirs[reservoir_index(domains[j], slot)]);
+            var reservoir = load_reservoir(domains[j], slot);
+            if j > 0u {
+                reservoir.confidence_weight = min(reservoir.confidence_weight, params.spatial_cap);
+            }
+            combination_offer(reservoir);
         }
-        let needed = select(1u, found, needs_every_domain());
-        for (var j = 0u; j < needed; j += 1u) {
+        for (var j = 0u; j < combination_valuers(); j += 1u) {
             combination_value(load_pixel(domains[j]), j, false);
         }
-        reservoirs_out[reservoir_index(pixel, slot)] = combination_finish(&rng);
+        store_reservoir(pixel, slot, combination_finish(&rng));
     }
 }
 

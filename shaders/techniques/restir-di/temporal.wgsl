@@ -7,17 +7,22 @@
 // albedo); history cap of Bitterli et al. 2020, section 4.2.
 #include "scene/visibility_buffer.wgsl"
 #include "scene/counters.wgsl"
-#include "techniques/restir-di/combine.wgsl"
+#include "techniques/common/combine.wgsl"
+#include "techniques/restir-di/reservoirs.wgsl"
 
 @group(1) @binding(2) var previous_visibility: texture_2d<u32>;
-@group(1) @binding(4) var<storage, read> reservoirs: array<Reservoir>;
-@group(1) @binding(5) var<storage, read> reservoirs_previous: array<Reservoir>;
-@group(1) @binding(6) var<storage, read_write> reservoirs_out: array<Reservoir>;
 
 // Where the point that a pixel sees was in the previous frame.
 fn previous_position(pixel: vec2u) -> vec3f {
     let seen = textureLoad(visibility, pixel, 0);
     return triangle_point(previous_instance(seen.x), previous_triangle(seen.x, seen.y), bitcast<vec2f>(seen.zw));
+}
+
+// A pixel's partner in its 4 x 4 block, which the block's other diagonal mirrors it to; the blocks' corners are drawn anew
+// each frame, so that no pixel takes the same history twice in a row. The same for all pixels: it looks at no sample.
+fn permuted(pixel: vec2i) -> vec2i {
+    let corner = vec2i(pcg4d(vec4u(frame.index, frame.seed, STREAM_TEMPORAL, 0u)).xy >> vec2u(30u));
+    return ((pixel + corner) ^ vec2i(3)) - corner;
 }
 
 // The previous frame's pixel that saw this point, or (-1, -1) (thesis 000, section 4.2.3).
@@ -26,7 +31,13 @@ fn reproject(position: vec3f) -> vec2i {
     if any(film < vec2f(0.0)) || any(film >= vec2f(frame.size)) {
         return vec2i(-1);
     }
-    return vec2i(film);
+    let pixel = vec2i(film);
+    if params.temporal_permutation == 0u {
+        return pixel;
+    }
+    let other = permuted(pixel);
+    let is_outside = any(other < vec2i(0)) || any(other >= vec2i(frame.size));
+    return select(other, pixel, is_outside);
 }
 
 // Whether the surface, whose point was at `position`, is the one that was seen there.
@@ -40,8 +51,8 @@ fn is_same_surface(surface: Surface, position: vec3f, previous: Surface) -> bool
 
 fn combine_slot(pixel: vec2u, previous_pixel: vec2u, slot: u32, surface: Surface, previous: Surface,
     rng: ptr<function, Rng>) {
-    let current = reservoirs[reservoir_index(pixel, slot)];
-    var history = reservoirs_previous[reservoir_index(previous_pixel, slot)];
+    let current = load_reservoir(pixel, slot);
+    var history = load_previous_reservoir(previous_pixel, slot);
     if history.light != NONE {
         history.unbiased_contribution_weight *= light_growth(history.light);
     }
@@ -50,19 +61,19 @@ fn combine_slot(pixel: vec2u, previous_pixel: vec2u, slot: u32, surface: Surface
     combination_offer(current);
     combination_offer(history);
     // A loop rather than two calls, for each call is inlined.
-    for (var j = 0u; j < 2u; j += 1u) {
+    for (var j = 0u; j < combination_valuers(); j += 1u) {
         var domain = surface;
         if j == 1u {
             domain = previous;
         }
         combination_value(domain, j, j == 1u);
     }
-    reservoirs_out[reservoir_index(pixel, slot)] = combination_finish(rng);
+    store_reservoir(pixel, slot, combination_finish(rng));
 }
 
 fn keep(pixel: vec2u) {
     for (var slot = 0u; slot < slot_count(); slot += 1u) {
-        reservoirs_out[reservoir_index(pixel, slot)] = reservoirs[reservoir_index(pixel, slot)];
+        keep_reservoir(pixel, slot);
     }
 }
 
@@ -86,7 +97,7 @@ fn reuse_pixel(pixel: vec2u) {
     }
     // Triangles are numbered for their frame, instances are those of this one.
     let previous = load_seen(frame.previous_camera, previous_instance(seen.x), seen.y, bitcast<vec2f>(seen.zw));
-    if !is_same_surface(surface, position, previous) {
+    if !reuse_everything && !is_same_surface(surface, position, previous) {
         keep(pixel);
         return;
     }

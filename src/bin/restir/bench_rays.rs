@@ -105,10 +105,16 @@ struct SetReport {
 }
 
 pub fn run(args: &Args) -> Result<()> {
+    if args.hits.is_some() && args.hits == args.rays {
+        return Err(Failure::usage("hits", "they would take the place of the rays"));
+    }
     let listed = args.rays.as_ref().map(|path| ray_sets::read(path)).transpose()?;
     let flat = scene::open(&args.scene, &args.choice, None)?;
     report::warnings(&flat.warnings);
     let camera = match (args.eye, args.target) {
+        (Some(eye), Some(target)) if eye == target => {
+            return Err(Failure::usage("target", "it is where the camera stands"));
+        }
         (Some(eye), Some(target)) => Camera::look_at("given", eye, target, args.fov.to_radians()),
         _ => flat.cameras[scene::camera(&flat.cameras, args.camera.as_deref())?].clone(),
     };

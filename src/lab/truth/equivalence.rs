@@ -32,8 +32,12 @@ impl Estimate {
     /// # Errors
     /// Those of rendering.
     pub fn radiance(renderer: &mut Renderer, runs: u32, frames: u32, tile: u32) -> Result<Self> {
-        let pictures = pictures(renderer, runs, frames)?;
-        Ok(Self::of(&pictures.iter().map(|picture| region_means(picture, tile)).collect::<Vec<_>>()))
+        Ok(Self::of_pictures(&pictures(renderer, runs, frames)?, tile))
+    }
+
+    /// The same of the pictures of independent runs.
+    pub fn of_pictures(pictures: &[Image], tile: u32) -> Self {
+        Self::of(&pictures.iter().map(|picture| region_means(picture, tile)).collect::<Vec<_>>())
     }
 }
 

@@ -35,9 +35,18 @@ pub const fn capacity(binary_nodes: usize) -> usize {
 /// Collapses the binary tree below `nodes[root]`. The result will lie at index `first_node` of all wide nodes; `first_item`
 /// is added to what leaves name.
 pub fn collapse(nodes: &[BvhNode], root: usize, first_node: u32, first_item: u32) -> Wide {
-    let mut collapse = Collapse::new(nodes, root, first_node, first_item);
-    while !collapse.go_on(usize::MAX) {}
-    collapse.wide
+    Collapse::new(nodes, root, first_node, first_item).finish()
+}
+
+/// As [`collapse`], of a tree that was built within the limits and has been refitted since: other boxes are opened, and another
+/// stack is needed. Where that is more than [`MAX_STACK`], nodes keep the two children they had, which take as many entries as
+/// the tree is deep.
+pub fn collapse_refitted(nodes: &[BvhNode], root: usize, first_node: u32, first_item: u32) -> Wide {
+    let wide = collapse(nodes, root, first_node, first_item);
+    if wide.stack <= MAX_STACK {
+        return wide;
+    }
+    Collapse { most_children: 2, ..Collapse::new(nodes, root, first_node, first_item) }.finish()
 }
 
 /// A collapse that can be done in parts.
@@ -45,6 +54,7 @@ pub struct Collapse<'a> {
     nodes: &'a [BvhNode],
     first_node: u32,
     first_item: u32,
+    most_children: usize,
     /// (binary node, its wide one, stack entries below it)
     pending: Vec<(usize, usize, u32)>,
     /// What is done so far.
@@ -55,15 +65,20 @@ impl<'a> Collapse<'a> {
     /// Starts what [`collapse`] does.
     pub fn new(nodes: &'a [BvhNode], root: usize, first_node: u32, first_item: u32) -> Self {
         let wide = Wide { nodes: vec![bytemuck::Zeroable::zeroed()], stack: 0 };
-        Collapse { nodes, first_node, first_item, pending: vec![(root, 0, 0)], wide }
+        Collapse { nodes, first_node, first_item, most_children: 4, pending: vec![(root, 0, 0)], wide }
+    }
+
+    fn finish(mut self) -> Wide {
+        while !self.go_on(usize::MAX) {}
+        self.wide
     }
 
     /// Makes at most `count` more nodes; whether that was all.
     pub fn go_on(&mut self, count: usize) -> bool {
-        let Collapse { nodes, wide, pending, .. } = self;
+        let Collapse { nodes, wide, pending, most_children, .. } = self;
         for _ in 0..count {
             let Some((source, target, below)) = pending.pop() else { return true };
-            let children = open(nodes, source);
+            let children = open(nodes, source, *most_children);
             let mut references = [0; 4];
             let mut boxes = [None; 4];
             let entries = below + children.count as u32 - 1;
@@ -104,11 +119,11 @@ impl Children {
     }
 }
 
-/// The children of a binary node, the largest inner ones of them replaced by theirs until there are four. A leaf is its own
-/// only child.
-fn open(nodes: &[BvhNode], source: usize) -> Children {
+/// The children of a binary node, the largest inner ones of them replaced by theirs until there are `most` (two to four). A
+/// leaf is its own only child.
+fn open(nodes: &[BvhNode], source: usize, most: usize) -> Children {
     let mut children = Children { nodes: [source, 0, 0, 0], count: 1 };
-    while children.count < 4 {
+    while children.count < most {
         let area = |k: &usize| half_area(&nodes[children.nodes[*k]]);
         let inner = (0..children.count).filter(|&k| nodes[children.nodes[k]].count == 0);
         let Some(largest) = inner.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
@@ -171,7 +186,7 @@ fn exponent(extent: f64) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{shell, small, soup};
-    use super::super::{build, build_top};
+    use super::super::{MAX_DEPTH, build, build_top};
     use super::*;
 
     /// The box of a child as a shader sees it; none where there is no child.
@@ -267,5 +282,27 @@ mod tests {
         for triangles in [nested, apart] {
             assert!(collapse(&build(&triangles).nodes, 0, 0, 0).stack <= MAX_STACK);
         }
+    }
+
+    /// A refitted tree may have grown wide bushes beside a long, small stem.
+    #[test]
+    fn refitted_trees_need_no_larger_stack() {
+        let inner =
+            |size: f32, first: u32| BvhNode { min: -Vec3::splat(size), first, max: Vec3::splat(size), count: 0 };
+        let leaf = || BvhNode { count: 1, ..inner(0.1, 0) };
+        let mut nodes = vec![inner(9.0, 1)];
+        for _ in 1..MAX_DEPTH - 3 {
+            let first = nodes.len() as u32;
+            // The stem goes on after the six nodes of a bush.
+            nodes.extend([inner(1.0, first + 8), inner(3.0, first + 2), inner(2.0, first + 4), inner(2.0, first + 6)]);
+            nodes.extend([leaf(), leaf(), leaf(), leaf()]);
+        }
+        nodes.extend([leaf(), leaf()]);
+        assert!(collapse(&nodes, 0, 0, 0).stack > MAX_STACK);
+        let wide = collapse_refitted(&nodes, 0, 0, 0);
+        assert!(wide.stack <= MAX_STACK && wide.nodes.len() <= capacity(nodes.len()), "{}", wide.stack);
+        let is_leaf = |node: &WideNode, k: usize| child_box(node, k).is_some() && node.children[k] & LEAF != 0;
+        let leaves: usize = wide.nodes.iter().map(|node| (0..4).filter(|&k| is_leaf(node, k)).count()).sum();
+        assert_eq!(leaves, nodes.iter().filter(|node| node.count != 0).count());
     }
 }

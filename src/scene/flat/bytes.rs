@@ -18,7 +18,7 @@ const _: () = assert!(cfg!(target_endian = "little"), "arrays are copied as they
 
 const MAGIC: [u8; 4] = *b"RSTR";
 /// Of the layout: to be raised by each change to the header, the arrays or their elements.
-pub(super) const VERSION: u32 = 4;
+pub(super) const VERSION: u32 = 5;
 const PREFIX: usize = 16;
 const ALIGNMENT: usize = 16;
 

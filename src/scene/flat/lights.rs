@@ -122,7 +122,23 @@ pub(super) fn build(
         light.alias_threshold = entry.threshold;
         light.alias_light = entry.alias;
     }
+    accumulate(&mut lights);
     Ok((lights, first_punctual))
+}
+
+/// Fills in the cumulative distribution, in whole parts of 2^32. Whatever can be drawn has a part at least, so that the
+/// densities which follow from differences leave no light out.
+fn accumulate(lights: &mut [Light]) {
+    const WHOLE: f64 = 4_294_967_296.0;
+    let can_be_drawn = lights.iter().filter(|light| light.pmf > 0.0).count() as f64;
+    let total: f64 = lights.iter().map(|light| f64::from(light.pmf)).sum();
+    let (mut sum, mut drawn) = (0.0, 0.0);
+    for light in lights {
+        // A part for each, and the rest by probability.
+        light.cumulative = (drawn + sum * (WHOLE - can_be_drawn)).min(WHOLE - 1.0) as u32;
+        sum += f64::from(light.pmf) / total;
+        drawn += f64::from(u8::from(light.pmf > 0.0));
+    }
 }
 
 fn empty(kind: u32) -> Light {
@@ -164,5 +180,28 @@ fn flatten(light: &PunctualLight) -> Light {
         cos_inner: inner.cos(),
         cos_outer: outer.cos(),
         ..empty(kind)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Parts of the distribution are those of the probabilities, none is empty that can be drawn, and together they are whole.
+    #[test]
+    fn the_cumulative_distribution_leaves_out_no_light() {
+        let weights = [1e-12, 3.0, 0.0, 1e-12, 1.0, 1e-12];
+        let mut lights: Vec<Light> = weights.map(|_| empty(LIGHT_TRIANGLE)).to_vec();
+        for (light, entry) in lights.iter_mut().zip(alias::build(&weights)) {
+            light.pmf = entry.pmf;
+        }
+        accumulate(&mut lights);
+        let ends = lights.iter().skip(1).map(|light| u64::from(light.cumulative)).chain([1 << 32]);
+        let parts: Vec<u64> = lights.iter().zip(ends).map(|(light, end)| end - u64::from(light.cumulative)).collect();
+        assert_eq!(parts.iter().sum::<u64>(), 1 << 32);
+        for (weight, part) in weights.iter().zip(parts) {
+            let expected = weight / 4.0 * 4_294_967_296.0;
+            assert!((part > 0) == (*weight > 0.0) && (part as f64 - expected).abs() < 8.0, "{part} for {expected}");
+        }
     }
 }

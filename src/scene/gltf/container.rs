@@ -308,6 +308,10 @@ struct Asset {
 
 /// Refuses other versions than 2.0 and extensions that are required but not supported.
 fn check_header(file: &str, json: &[u8]) -> Result<Header> {
+    // Of an array the parser would take the elements for the fields.
+    if json.trim_ascii_start().first() == Some(&b'[') {
+        return Err(Error::bad_file(file, "JSON", "it is a list instead of an object"));
+    }
     let header: Header = serde_json::from_slice(json).map_err(|error| json_error(file, &error))?;
     let unsupported = |what: String| Err(Error::Unsupported { file: file.into(), what });
     // A later minor version is readable unless it says otherwise in minVersion (specification, section 3.2).

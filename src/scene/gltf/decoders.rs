@@ -103,6 +103,7 @@ impl Document<'_> {
             Fault::Unsupported(what) => {
                 Error::Unsupported { file: self.file.into(), what: format!("{} ({place})", tidy(&what)) }
             }
+            other => Error::of_fault(self.file, other),
         })
     }
 }

@@ -157,10 +157,13 @@ impl Loader<'_> {
                 None => self.scene.warnings.push(format!("{place}: its light is left out: its scale is zero")),
             }
         }
-        if let Some(light) = area_lights::read(self.document, node, &place)?
-            && let Err(error) = self.scene.add_area_light(&light, to_world)
-        {
-            self.scene.warnings.push(format!("{place}: its area light is left out: {error}"));
+        if let Some(light) = area_lights::read(self.document, node, &place)? {
+            let instance = self.scene.instances.len() as u32;
+            match self.scene.add_area_light(&light, to_world) {
+                Ok(()) if self.is_rigged => self.scene.rig.instances.push(Placement::rigid(instance, rig_node)),
+                Ok(()) => {}
+                Err(error) => self.scene.warnings.push(format!("{place}: its area light is left out: {error}")),
+            }
         }
         if let Some(camera) = node.camera {
             match camera::load(self.document, camera.value(), &to_world, node, &place)? {

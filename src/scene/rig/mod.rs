@@ -189,6 +189,14 @@ pub struct Placement {
     pub padding: [u32; 3],
 }
 
+impl Placement {
+    /// An instance that takes the whole of its node's motion and has no shape of its own to change.
+    pub fn rigid(instance: u32, node: u32) -> Self {
+        let offset = Mat4::IDENTITY;
+        Placement { offset, instance, node, skin: NONE, first_weight: 0, weight_count: 0, padding: [0; 3] }
+    }
+}
+
 /// A light or camera on a node; it looks along the node's -Z.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
