@@ -9,7 +9,7 @@
 const TILE_LIGHT_SURFACE = 0u; // `place` is the point; `weight` the normal, times luminance over density
 const TILE_LIGHT_TWO_SIDED = 1u; // the same
 const TILE_LIGHT_POINT = 2u; // `weight` is luminance over density, and the range
-const TILE_LIGHT_SPOT = 3u; // `weight` is luminance over density, the axis and the cones' cosines
+const TILE_LIGHT_SPOT = 3u; // `weight` is luminance over density, the axis and the cones' cosines, packed
 const TILE_LIGHT_DISTANT = 4u; // `place` is the direction to the light; `weight` luminance over density
 const TILE_LIGHT_KIND_SHIFT = 29u;
 
@@ -103,13 +103,13 @@ fn pack_tile_light(sample: LightSample, inverse_pdf: f32) -> TileLight {
         return packed;
     }
     packed.weight.y = bitcast<f32>(pack2x16snorm(octahedral_encode(lights[light].direction)));
-    packed.weight.z = lights[light].cos_outer;
+    packed.weight.z = bitcast<f32>(pack2x16snorm(vec2f(lights[light].cos_outer, lights[light].cos_inner)));
     packed.light |= TILE_LIGHT_SPOT << TILE_LIGHT_KIND_SHIFT;
     return packed;
 }
 
 // What a presampled light sends to a point. Positive wherever the light itself sends anything, and close to it: a spot
-// light is one of even intensity within its cone and without a range.
+// light has no range here.
 fn tile_incidence(light: TileLight, position: vec3f) -> TileIncidence {
     let kind = light.light >> TILE_LIGHT_KIND_SHIFT;
     if (scene_has_environment || scene_has_sun || scene_has_punctual_lights) && kind == TILE_LIGHT_DISTANT {
@@ -131,9 +131,11 @@ fn tile_incidence(light: TileLight, position: vec3f) -> TileIncidence {
             value *= max(1.0 - x * x, 0.0);
         }
         if kind == TILE_LIGHT_SPOT {
-            // The axis is rounded; a little more than the cone, lest anything within be left out.
+            // As cone_attenuation; but all is rounded, so the cone is a little wider, lest anything within be left out.
             let axis = octahedral_decode(unpack2x16snorm(bitcast<u32>(light.weight.y)));
-            value = select(0.0, value, -dot(axis, direction) > light.weight.z - 1e-4);
+            let cones = unpack2x16snorm(bitcast<u32>(light.weight.z));
+            let within = 2e-4 - dot(axis, direction) - cones.x;
+            value *= square(clamp(within / max(0.001, cones.y - cones.x), 0.0, 1.0));
         }
     }
     // As where light_contribution gives up.

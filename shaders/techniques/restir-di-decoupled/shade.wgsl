@@ -35,6 +35,7 @@ struct Samples {
     confidences: vec3f, // c_i; 0 where there is no domain
     ages: vec3u, // of what is known of their visibility
     visible: vec3<bool>, // V_0(x_i), as far as is known
+    resolved: array<TileLight, 3>, // where nothing moves: the same light for every domain, fetched once
 }
 
 // What a pixel shows of direct light, and hands on.
@@ -71,7 +72,8 @@ fn feeds_visibility(i: u32) -> bool {
 
 fn gather_samples(selection: Selection) -> Samples {
     var samples = Samples(vec3u(selection.light, NONE, NONE), vec3u(selection.point, 0u, 0u),
-        vec3f(selection.unbiased_contribution_weight, 0.0, 0.0), vec3f(1.0, 0.0, 0.0), vec3u(0u), vec3<bool>(false));
+        vec3f(selection.unbiased_contribution_weight, 0.0, 0.0), vec3f(1.0, 0.0, 0.0), vec3u(0u), vec3<bool>(false),
+        array<TileLight, 3>());
     let domains = vec3u(0u, selection.temporal, selection.spatiotemporal);
     for (var i = 0u; i < DOMAINS; i += 1u) {
         if i > 0u && domains[i] != NONE {
@@ -92,8 +94,23 @@ fn gather_samples(selection: Selection) -> Samples {
                 samples.confidences[i] = 0.0;
             }
         }
+        if !scene_has_motion && samples.weights[i] > 0.0 {
+            samples.resolved[i] = pack_tile_light(light_sample_of(samples, i), 1.0);
+        }
     }
     return samples;
+}
+
+// p-hat_j(x_i).
+fn domain_target(domain: Surface, samples: Samples, i: u32, previous: bool) -> f32 {
+    if scene_has_motion {
+        return approximate_target(domain, light_sample_of(samples, i), previous);
+    }
+    let incidence = tile_incidence(samples.resolved[i], domain.position);
+    if incidence.value <= 0.0 {
+        return 0.0;
+    }
+    return incidence.value * approximate_scatter(domain, incidence.direction, incidence.distance);
 }
 
 fn shade_samples(pixel: vec2u, surface: Surface, selection: Selection) -> Shaded {
@@ -116,7 +133,7 @@ fn shade_samples(pixel: vec2u, surface: Surface, selection: Selection) -> Shaded
             if samples.weights[i] <= 0.0 {
                 continue;
             }
-            var value = approximate_target(domain, light_sample_of(samples, i), j > 0u);
+            var value = domain_target(domain, samples, i, j > 0u);
             if j == 0u {
                 targets[i] = value;
             }
