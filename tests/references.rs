@@ -83,7 +83,7 @@ fn description(scene: &Scene) -> Value {
 }
 
 #[test]
-#[ignore = "not yet run: references of hall and glossy-spheres are still to be rendered"]
+#[ignore = "hall is 0.48 ± 0.12 % brighter than by Mitsuba, not yet explained; minutes long"]
 fn the_path_tracer_agrees_with_mitsuba() {
     if let Some(folder) = std::env::var_os("EXPORT_REFERENCES") {
         for (name, camera, file) in SCENES {
