@@ -1,6 +1,5 @@
-//! `restir-report`: the corrected form has the path tracer's expectation in all five configurations, and each of the report's
-//! faults is caught as a bias by the same test (support/equivalence.rs; docs/testing.md). What this prints stands on the
-//! technique's page.
+//! `restir-report`, beside what it claims (lab/truth): each of the report's faults in other configurations, on polished metal, while
+//! lights revolve and the camera slides; NaNs are counted. What this prints stands on the technique's page.
 
 mod support;
 
@@ -85,26 +84,12 @@ const NO_SIMILARITY: &str = "fault_no_similarity";
 const UNGUARDED: &str = "fault_unguarded_pdf";
 
 #[test]
-fn configurations_equal_the_path_tracer() {
-    for (configuration, runs) in
-        [("a-naive", 2 * RUNS), ("b-ris", RUNS), ("c-temporal", RUNS), ("d-spatial", RUNS), ("e-both", RUNS)]
-    {
-        let comparison = compare(configuration, &[("configuration", configuration)], runs);
-        assert!(comparison.is_equivalent(), "{configuration} is not equivalent");
-    }
-}
-
-#[test]
 fn faults_are_caught() {
     for (faults, configuration) in [
         (&[SAMPLE_COUNT][..], "c-temporal"),
         (&[SAMPLE_COUNT], "d-spatial"),
-        (&[SAMPLE_COUNT], "e-both"),
         (&[TARGET, NO_SIMILARITY], "d-spatial"),
-        (&[TARGET, NO_SIMILARITY], "e-both"),
         (&[COUNT_WEIGHTS, NO_SIMILARITY], "d-spatial"),
-        (&[COUNT_WEIGHTS, NO_SIMILARITY], "e-both"),
-        (&[UNGUARDED], "b-ris"),
         (&[UNGUARDED], "e-both"),
         (&[UNGUARDED, NO_SIMILARITY], "e-both"),
     ] {

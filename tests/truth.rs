@@ -36,6 +36,11 @@ fn restir_di_decoupled_keeps_its_claims() {
 }
 
 #[test]
+fn restir_report_keeps_its_claims() {
+    prove("restir-report");
+}
+
+#[test]
 fn ris_keeps_its_claims() {
     prove("ris");
 }

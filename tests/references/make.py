@@ -2,7 +2,7 @@
 """Renders the reference pictures of tests/references with Mitsuba 3, which shares no code with restir.
 
     pip install mitsuba numpy
-    EXPORT_REFERENCES=FOLDER cargo test --test references
+    EXPORT_REFERENCES=FOLDER cargo test --test references -- --ignored
     python3 tests/references/make.py FOLDER tests/references
 
 For each FOLDER/NAME.json two files are written: NAME.exr, the mean of independent renderings, linear RGB; and NAME-variance.exr,

@@ -80,7 +80,7 @@ impl Session {
         // A wrong name or value is told before long work.
         let technique = techniques::find(&options.technique).map_err(Failure::from_option)?;
         for (key, value) in &options.set {
-            technique.spec(key).and_then(|spec| spec.parse(value)).map_err(Failure::from_option)?;
+            technique.spec(key).map_or(Ok(0), |spec| spec.parse(value)).map_err(Failure::from_option)?;
         }
         let flat = scene::open(name, &options.choice, Some((&options.lighting, options.seed)))?;
         report::warnings(&flat.warnings);
