@@ -252,6 +252,10 @@ impl Shader {
     #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn accepts(&self, edited: &super::shader_source::Flattened) -> std::result::Result<(), String> {
         let reflection = super::shader_source::reflect(edited)?;
+        let is_compute = self.workgroup_size != [0; 3];
+        if is_compute && !reflection.entry_points.iter().any(|(name, _)| name == "main") {
+            return Err(format!("{}: the entry point main is gone", self.file));
+        }
         let bindings = |name, group, index, kind| (name, group, index, kind);
         let new = reflection.bindings.iter().map(|b| bindings(b.name.as_str(), b.group, b.index, b.kind));
         let old = self.bindings.iter().map(|b| bindings(b.name, b.group, b.index, b.kind));
