@@ -82,18 +82,10 @@ fn description(scene: &Scene) -> Value {
     })
 }
 
-#[test]
-#[ignore = "hall is 0.48 ± 0.12 % brighter than by Mitsuba, not yet explained; minutes long"]
-fn the_path_tracer_agrees_with_mitsuba() {
-    if let Some(folder) = std::env::var_os("EXPORT_REFERENCES") {
-        for (name, camera, file) in SCENES {
-            let path = Path::new(&folder).join(format!("{file}.json"));
-            std::fs::write(&path, description(&matte(name, camera)).to_string()).expect("a writable folder");
-        }
-        return;
-    }
+/// The scenes in which the two disagree.
+fn disagreements(scenes: &[(&str, usize, &str)]) -> Vec<String> {
     let mut failed = Vec::new();
-    for (name, camera, file) in SCENES {
+    for (name, camera, file) in scenes {
         let read = |kind: &str| read_exr(&folder().join(format!("{file}{kind}.exr"))).expect("a reference");
         let means = region_means(&read(""), TILE);
         // Pixels are independent: the variance of a mean over n of them is the mean of their variances over n. Channels of
@@ -103,7 +95,7 @@ fn the_path_tracer_agrees_with_mitsuba() {
         let noise = deviations.iter().enumerate().map(|(i, variance)| (variance / pixels(i)).sqrt());
         let reference = Estimate(means.into_iter().zip(noise).collect());
         let settings = [("render.max_depth", DEPTH)];
-        let mut renderer = renderer(&gpu(), flatten(&matte(name, camera)), [SIZE; 2], "path-tracer", &settings);
+        let mut renderer = renderer(&gpu(), flatten(&matte(name, *camera)), [SIZE; 2], "path-tracer", &settings);
         renderer.set_accumulate(true);
         let estimate = Estimate::radiance(&mut renderer, RUNS, FRAMES, TILE).expect("pictures");
         let comparison = Comparison::new(&estimate, &reference, MARGINS);
@@ -112,5 +104,26 @@ fn the_path_tracer_agrees_with_mitsuba() {
             failed.push(format!("{name}: {comparison}"));
         }
     }
+    failed
+}
+
+#[test]
+fn the_path_tracer_agrees_with_mitsuba() {
+    let short: Vec<_> = SCENES.into_iter().filter(|(name, ..)| ["cornell", "glossy-spheres"].contains(name)).collect();
+    let failed = disagreements(&short);
+    assert!(failed.is_empty(), "{failed:#?}");
+}
+
+#[test]
+#[ignore = "minutes long; and hall is 0.48 ± 0.12 % brighter than by Mitsuba, not yet explained"]
+fn the_path_tracer_agrees_with_mitsuba_in_all_six() {
+    if let Some(folder) = std::env::var_os("EXPORT_REFERENCES") {
+        for (name, camera, file) in SCENES {
+            let path = Path::new(&folder).join(format!("{file}.json"));
+            std::fs::write(&path, description(&matte(name, camera)).to_string()).expect("a writable folder");
+        }
+        return;
+    }
+    let failed = disagreements(&SCENES);
     assert!(failed.is_empty(), "{failed:#?}");
 }

@@ -5,18 +5,10 @@
 // shapes, lights and BVH of one frame are kept. So reuse stays unbiased whatever moves.
 // Source: Bitterli et al. 2020, Algorithm 5, lines 8 to 12; thesis 001, section 5.3.1 (rejection by position, normal and
 // albedo); history cap of Bitterli et al. 2020, section 4.2.
-#include "scene/visibility_buffer.wgsl"
 #include "scene/counters.wgsl"
 #include "techniques/common/combine.wgsl"
+#include "techniques/common/reprojection.wgsl"
 #include "techniques/restir-di/reservoirs.wgsl"
-
-@group(1) @binding(2) var previous_visibility: texture_2d<u32>;
-
-// Where the point that a pixel sees was in the previous frame.
-fn previous_position(pixel: vec2u) -> vec3f {
-    let seen = textureLoad(visibility, pixel, 0);
-    return triangle_point(previous_instance(seen.x), previous_triangle(seen.x, seen.y), bitcast<vec2f>(seen.zw));
-}
 
 // A pixel's partner in its 4 x 4 block, which the block's other diagonal mirrors it to; the blocks' corners are drawn anew
 // each frame, so that no pixel takes the same history twice in a row. The same for all pixels: it looks at no sample.
@@ -28,7 +20,7 @@ fn permuted(pixel: vec2i) -> vec2i {
 // The previous frame's pixel that saw this point, or (-1, -1) (thesis 000, section 4.2.3).
 fn reproject(position: vec3f) -> vec2i {
     let film = project(frame.previous_camera, position);
-    if any(film < vec2f(0.0)) || any(film >= vec2f(frame.size)) {
+    if !is_on_film(film) {
         return vec2i(-1);
     }
     let pixel = vec2i(film);

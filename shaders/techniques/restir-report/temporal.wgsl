@@ -3,20 +3,13 @@
 // Writes the merged reservoirs.
 // Source: report 003, section 4.5, with what it calls missing in section 8: reprojection, and a test that the history is
 // of the same surface. Surface and lights of the history are those of the previous frame, so that lights may revolve.
-#include "scene/visibility_buffer.wgsl"
+#include "techniques/common/reprojection.wgsl"
 #include "techniques/restir-report/merge.wgsl"
 #include "techniques/restir-report/similarity.wgsl"
 
-@group(1) @binding(2) var previous_visibility: texture_2d<u32>;
 @group(1) @binding(4) var<storage, read> reservoirs: array<ReportReservoir>;
 @group(1) @binding(5) var<storage, read> reservoirs_previous: array<ReportReservoir>;
 @group(1) @binding(6) var<storage, read_write> reservoirs_out: array<ReportReservoir>;
-
-// Where the point that a pixel sees was in the previous frame.
-fn previous_position(pixel: vec2u) -> vec3f {
-    let seen = textureLoad(visibility, pixel, 0);
-    return triangle_point(previous_instance(seen.x), previous_triangle(seen.x, seen.y), bitcast<vec2f>(seen.zw));
-}
 
 fn keep(pixel: vec2u) {
     for (var strategy = 0u; strategy < STRATEGY_COUNT; strategy += 1u) {
