@@ -14,7 +14,7 @@ use support::*;
 const SIZE: u32 = 64;
 const TILE: u32 = 32;
 const MARGINS: Margins = Margins { picture: 0.003, tile: 0.01 };
-const RUNS: u32 = 32;
+const RUNS: u32 = 16;
 const FRAMES: u32 = 24;
 /// Nothing is asked of pixels that a light's edge goes through.
 const DIRECT: &[(&str, &str)] = &[("render.max_depth", "1"), ("render.pixel_filter", "center")];
@@ -93,7 +93,7 @@ fn planted_faults_of_candidates_are_caught() {
         let gpu = fresh_gpu();
         gpu.plant(old, new).unwrap();
         let mut renderer = ris(&gpu, &[("bsdf_samples", "1"), ("light_choice", choice)]);
-        let comparison = compare(what, &mut renderer, RUNS / 2);
+        let comparison = compare(what, &mut renderer, RUNS / 4);
         assert!(comparison.is_caught(), "'{what}' went unnoticed");
     }
 }

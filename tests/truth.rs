@@ -36,6 +36,7 @@ fn restir_di_decoupled_keeps_its_claims() {
 }
 
 #[test]
+#[ignore = "ten minutes: cornell-64 is noisy. tests/report.rs proves the same of a quieter scene; `restir truth` runs this anywhere"]
 fn restir_report_keeps_its_claims() {
     prove("restir-report");
 }
