@@ -58,7 +58,8 @@ fn random_settings_render() {
         let scene = &scenes[(i / techniques.len()) % scenes.len()];
         let mut renderer = renderer(&gpu, scene.clone(), SIZE, technique.id, &[]);
         let mut settings = Vec::new();
-        for spec in technique.params {
+        // A fault that makes NaNs on purpose, to be looked at.
+        for spec in technique.params.iter().filter(|spec| spec.name != "fault_unguarded_pdf") {
             let value = random.value(spec);
             // What contradicts another setting is refused, and then the old value stays.
             if renderer.set(spec.name, &value).is_ok() {
@@ -73,7 +74,11 @@ fn random_settings_render() {
             let mut camera = scene.cameras[0].clone();
             camera.position += 0.05 * frame as f32 * Vec3::X;
             renderer.set_camera(&camera);
-            renderer.render_frame().unwrap_or_else(|e| panic!("{what}: {e}"));
+            match renderer.render_frame() {
+                // Buffers that the device cannot hold are refused, with both numbers.
+                Err(error) if error.code() == "LIMIT" => break,
+                rendered => rendered.unwrap_or_else(|e| panic!("{what}: {e}")),
+            }
             let counters = pollster::block_on(renderer.counters()).unwrap_or_else(|e| panic!("{what}: {e}"));
             worst = (worst.0 + counters.nan, worst.1 + counters.inf);
         }
