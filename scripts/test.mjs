@@ -1,16 +1,12 @@
-// npm test: everything. One line per step; the first failure ends the run with its output.
+// npm test: everything but proofs that take minutes, which `npm run prove` adds. One line per step; the first failure ends the
+// run with its output.
 import { softwareEnvironment } from './environment.mjs';
 import { build } from './build.mjs';
 import { run, script, step } from './run.mjs';
+import { rustTests } from './rust-tests.mjs';
 import { setup } from './setup.mjs';
 
 const lastLine = (output) => output.trim().split('\n').at(-1);
-
-/** Adds up the `test result:` lines of all test binaries. */
-function rustSummary(output) {
-  const total = (word) => [...output.matchAll(new RegExp(`(\\d+) ${word}`, 'g'))].reduce((sum, [, count]) => sum + Number(count), 0);
-  return `${total('passed')} passed`;
-}
 
 /** Node's test runner ends with `# pass N` among its counts. */
 const nodeSummary = (output) => `${/^. pass (\d+)/m.exec(output)?.[1] ?? 0} passed`;
@@ -30,7 +26,7 @@ function steps() {
     ['clippy', () => cargo('clippy', '--all-targets', '--', '-D', 'warnings')],
     // In release, so that the page's build finds its build dependencies made.
     ['clippy, wasm', () => cargo('clippy', '--release', '--lib', '--target', 'wasm32-unknown-unknown', '--', '-D', 'warnings')],
-    ['rust tests', async () => rustSummary(await run(['cargo', 'test'], { env }))],
+    ['rust tests', () => rustTests(env, { whole: process.argv.includes('--whole') })],
     ['tint', async () => lastLine(await run(['node', 'scripts/tint.mjs']))],
     ['page', () => build()],
     ['types', () => run(['tsc', '--project', '.']).then(() => undefined)],

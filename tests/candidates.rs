@@ -48,7 +48,7 @@ fn reference() -> &'static Estimate {
     static REFERENCE: OnceLock<Estimate> = OnceLock::new();
     REFERENCE.get_or_init(|| {
         let mut renderer = renderer(&gpu(), scene().clone(), [SIZE; 2], "path-tracer", DIRECT);
-        Estimate::radiance(&mut renderer, 16, 200, TILE).unwrap()
+        Estimate::radiance(&mut renderer, 16, effort(200), TILE).unwrap()
     })
 }
 
@@ -57,8 +57,8 @@ fn ris(gpu: &Gpu, settings: &[(&str, &str)]) -> Renderer {
     renderer(gpu, scene().clone(), [SIZE; 2], "ris", &[&base[..], DIRECT, settings].concat())
 }
 
-fn compare(what: &str, renderer: &mut Renderer, runs: u32) -> Comparison {
-    let comparison = Comparison::new(&Estimate::radiance(renderer, runs, FRAMES, TILE).unwrap(), reference(), MARGINS);
+fn compare(what: &str, renderer: &mut Renderer, (runs, frames): (u32, u32), margins: Margins) -> Comparison {
+    let comparison = Comparison::new(&Estimate::radiance(renderer, runs, frames, TILE).unwrap(), reference(), margins);
     println!("{what}: {comparison}");
     comparison
 }
@@ -71,7 +71,8 @@ fn every_choice_of_candidates_equals_the_path_tracer() {
         &[("light_choice", "cdf"), ("bsdf_samples", "1")],
         &[("light_choice", "uniform"), ("bsdf_samples", "1")],
     ] {
-        let comparison = compare(&format!("{settings:?}"), &mut ris(&gpu(), settings), RUNS);
+        let comparison =
+            compare(&format!("{settings:?}"), &mut ris(&gpu(), settings), (RUNS, effort(FRAMES)), margins(MARGINS));
         assert!(comparison.is_equivalent(), "{settings:?} is not equivalent");
     }
 }
@@ -93,7 +94,7 @@ fn planted_faults_of_candidates_are_caught() {
         let gpu = fresh_gpu();
         gpu.plant(old, new).unwrap();
         let mut renderer = ris(&gpu, &[("bsdf_samples", "1"), ("light_choice", choice)]);
-        let comparison = compare(what, &mut renderer, RUNS / 4);
+        let comparison = compare(what, &mut renderer, (RUNS / 4, FRAMES), MARGINS);
         assert!(comparison.is_caught(), "'{what}' went unnoticed");
     }
 }

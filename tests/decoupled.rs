@@ -53,9 +53,9 @@ fn every_kind_of_light_is_drawn_as_often_as_it_says() {
         let mut renderer = renderer(gpu, every_kind_of_light(), [48; 2], technique, &settings);
         Estimate::radiance(&mut renderer, 48, frames, 48).unwrap()
     };
-    let truth = estimate(&gpu, "path-tracer", &[], 64);
+    let truth = estimate(&gpu, "path-tracer", &[], effort(64));
     let settings = [("indirect", "no"), ("visibility", "mis"), ("candidates", "32"), ("history_cap", "4")];
-    let comparison = Comparison::new(&estimate(&gpu, TECHNIQUE, &settings, 32), &truth, MARGINS);
+    let comparison = Comparison::new(&estimate(&gpu, TECHNIQUE, &settings, effort(32)), &truth, margins(MARGINS));
     println!("every kind of light: {comparison}");
     assert!(comparison.is_equivalent());
     // A plant: spheres as if half of each were drawn.

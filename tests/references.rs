@@ -1,5 +1,8 @@
 //! The path tracer agrees with another renderer: Mitsuba 3, on six built-in scenes made matte, by two one-sided tests.
 //!
+//! One rule differs and is put in place for the comparison: what is seen from behind its interpolated normal, at the outlines of
+//! coarse meshes, is black in Mitsuba. Here it is shaded as if seen from its horizon.
+//!
 //! `tests/references/make.py` rendered the files in `tests/references` from what this writes:
 //! `EXPORT_REFERENCES=FOLDER cargo test --test references -- --ignored`.
 
@@ -82,8 +85,13 @@ fn description(scene: &Scene) -> Value {
     })
 }
 
+/// What makes `viewed_normal` (shaders/scene/surface.wgsl) leave a normal that faces away as it is; the BSDF is 0 there.
+const BLACK_FROM_BEHIND: (&str, &str) = ("if facing < 1e-3 {", "if false {");
+
 /// The scenes in which the two disagree.
 fn disagreements(scenes: &[(&str, usize, &str)]) -> Vec<String> {
+    let gpu = fresh_gpu();
+    gpu.plant(BLACK_FROM_BEHIND.0, BLACK_FROM_BEHIND.1).expect("its place is there");
     let mut failed = Vec::new();
     for (name, camera, file) in scenes {
         let read = |kind: &str| read_exr(&folder().join(format!("{file}{kind}.exr"))).expect("a reference");
@@ -95,10 +103,10 @@ fn disagreements(scenes: &[(&str, usize, &str)]) -> Vec<String> {
         let noise = deviations.iter().enumerate().map(|(i, variance)| (variance / pixels(i)).sqrt());
         let reference = Estimate(means.into_iter().zip(noise).collect());
         let settings = [("render.max_depth", DEPTH)];
-        let mut renderer = renderer(&gpu(), flatten(&matte(name, *camera)), [SIZE; 2], "path-tracer", &settings);
+        let mut renderer = renderer(&gpu, flatten(&matte(name, *camera)), [SIZE; 2], "path-tracer", &settings);
         renderer.set_accumulate(true);
-        let estimate = Estimate::radiance(&mut renderer, RUNS, FRAMES, TILE).expect("pictures");
-        let comparison = Comparison::new(&estimate, &reference, MARGINS);
+        let estimate = Estimate::radiance(&mut renderer, RUNS, effort(FRAMES), TILE).expect("pictures");
+        let comparison = Comparison::new(&estimate, &reference, margins(MARGINS));
         println!("{name}: {comparison}");
         if !comparison.is_equivalent() {
             failed.push(format!("{name}: {comparison}"));
@@ -114,7 +122,7 @@ fn the_path_tracer_agrees_with_mitsuba() {
 }
 
 #[test]
-#[ignore = "minutes long; and hall is 0.48 ± 0.12 % brighter than by Mitsuba, not yet explained"]
+#[ignore = "minutes long"]
 fn the_path_tracer_agrees_with_mitsuba_in_all_six() {
     if let Some(folder) = std::env::var_os("EXPORT_REFERENCES") {
         for (name, camera, file) in SCENES {

@@ -16,7 +16,7 @@ fn prove(technique: &str) {
     let trial = Trial::find(technique).expect("a trial");
     let scene = builtin(trial.scene.strip_prefix("builtin:").expect("a built-in scene"));
     let device = || pollster::block_on(Gpu::headless(&restir::GpuOptions { default_limits: true }));
-    let findings = truth::check(&trial, false, &scene, &device, &|_, _, _| ()).expect("it can be carried out");
+    let findings = truth::check(&trial, !is_whole(), &scene, &device, &|_, _, _| ()).expect("it can be carried out");
     for finding in &findings {
         println!("{:?} {}: {:?}, {}", finding.step, finding.what, finding.verdict, finding.regions);
     }
@@ -36,7 +36,7 @@ fn restir_di_decoupled_keeps_its_claims() {
 }
 
 #[test]
-#[ignore = "ten minutes: cornell-64 is noisy. tests/report.rs proves the same of a quieter scene; `restir truth` runs this anywhere"]
+#[ignore = "minutes, for cornell-64 is noisy; tests/report.rs proves the same of a quieter scene"]
 fn restir_report_keeps_its_claims() {
     prove("restir-report");
 }

@@ -56,8 +56,14 @@ fn presample_pdf(sample: LightSample) -> f32 {
     return light_sample_pdf(vec3f(0.0), sample);
 }
 
-// Packs a sample of density 1 / `inverse_pdf`.
-fn pack_tile_light(sample: LightSample, inverse_pdf: f32) -> TileLight {
+// A presampled light with its colours: radiance, or the intensity of a light without extent.
+struct ResolvedLight {
+    packed: TileLight,
+    radiance: vec3f,
+}
+
+// Resolves a sample of density 1 / `inverse_pdf`.
+fn resolve_light(sample: LightSample, inverse_pdf: f32) -> ResolvedLight {
     let light = sample.light;
     let kind = lights[light].kind;
     var packed = TileLight(vec3f(0.0), light, vec3f(0.0), sample.point);
@@ -67,49 +73,51 @@ fn pack_tile_light(sample: LightSample, inverse_pdf: f32) -> TileLight {
         let uv = light_sample_barycentrics(sample);
         packed.place = triangle_point(instance, triangle, uv);
         // Seen at a right angle, where a clearcoat dims least: never zero where the light is not.
-        let value = luminance(emitted_radiance(triangle, uv, 1.0)) * inverse_pdf;
-        packed.weight = front_normal(instance, triangle, uv) * value;
+        let radiance = emitted_radiance(triangle, uv, 1.0);
+        packed.weight = front_normal(instance, triangle, uv) * (luminance(radiance) * inverse_pdf);
         if (load_triangle(triangle).flags & TRIANGLE_DOUBLE_SIDED) != 0u {
             packed.light |= TILE_LIGHT_TWO_SIDED << TILE_LIGHT_KIND_SHIFT;
         }
-        return packed;
+        return ResolvedLight(packed, radiance);
     }
     if scene_has_environment && kind == LIGHT_ENVIRONMENT {
         let uv = unpack_point(sample.point);
         packed.place = turn_to_world(environment_direction(uv), frame.environment_turn);
-        packed.weight.x = luminance(environment_read(uv)) * inverse_pdf;
+        let radiance = environment_read(uv);
+        packed.weight.x = luminance(radiance) * inverse_pdf;
         packed.light |= TILE_LIGHT_DISTANT << TILE_LIGHT_KIND_SHIFT;
-        return packed;
+        return ResolvedLight(packed, radiance);
     }
+    let intensity = lights[light].intensity;
     if scene_has_sun && kind == LIGHT_SUN {
         packed.place = sun_sample_direction(unpack_point(sample.point), frame.environment_turn);
-        packed.weight.x = luminance(lights[light].intensity) * inverse_pdf;
+        packed.weight.x = luminance(intensity) * inverse_pdf;
         packed.light |= TILE_LIGHT_DISTANT << TILE_LIGHT_KIND_SHIFT;
-        return packed;
+        return ResolvedLight(packed, intensity);
     }
     if !scene_has_punctual_lights {
-        return packed;
+        return ResolvedLight(packed, vec3f(0.0));
     }
-    packed.weight.x = luminance(lights[light].intensity) * inverse_pdf;
+    packed.weight.x = luminance(intensity) * inverse_pdf;
     if kind == LIGHT_DIRECTIONAL {
         packed.place = -lights[light].direction;
         packed.light |= TILE_LIGHT_DISTANT << TILE_LIGHT_KIND_SHIFT;
-        return packed;
+        return ResolvedLight(packed, intensity);
     }
     packed.place = lights[light].position;
     if kind == LIGHT_POINT {
         packed.weight.y = lights[light].range;
         packed.light |= TILE_LIGHT_POINT << TILE_LIGHT_KIND_SHIFT;
-        return packed;
+        return ResolvedLight(packed, intensity);
     }
     packed.weight.y = bitcast<f32>(pack2x16snorm(octahedral_encode(lights[light].direction)));
     packed.weight.z = bitcast<f32>(pack2x16snorm(vec2f(lights[light].cos_outer, lights[light].cos_inner)));
     packed.light |= TILE_LIGHT_SPOT << TILE_LIGHT_KIND_SHIFT;
-    return packed;
+    return ResolvedLight(packed, intensity);
 }
 
-// What a presampled light sends to a point. Positive wherever the light itself sends anything, and close to it: a spot
-// light has no range here.
+// What a presampled light sends to a point: exactly that, but for spot lights, and where a clearcoat dims it. Positive
+// wherever the light itself sends anything, and close to it: a spot light has no range here.
 fn tile_incidence(light: TileLight, position: vec3f) -> TileIncidence {
     let kind = light.light >> TILE_LIGHT_KIND_SHIFT;
     if (scene_has_environment || scene_has_sun || scene_has_punctual_lights) && kind == TILE_LIGHT_DISTANT {
@@ -141,4 +149,20 @@ fn tile_incidence(light: TileLight, position: vec3f) -> TileIncidence {
     // As where light_contribution gives up.
     value = select(0.0, max(value, 0.0) * inverse_square, distance_2 > 1e-12);
     return TileIncidence(direction, distance_2 * inverse_distance, value);
+}
+
+// Whether `tile_incidence` is all that can be said of a light.
+fn tile_light_is_exact(light: TileLight) -> bool {
+    return !scene_has_clearcoat
+        && !(scene_has_punctual_lights && light.light >> TILE_LIGHT_KIND_SHIFT == TILE_LIGHT_SPOT);
+}
+
+// What a resolved light of density 1 sends to a point, in colours.
+fn resolved_contribution(light: ResolvedLight, position: vec3f) -> LightContribution {
+    if !tile_light_is_exact(light.packed) {
+        return light_contribution(tile_light_sample(light.packed), position, false);
+    }
+    let incidence = tile_incidence(light.packed, position);
+    let value = light.radiance * (incidence.value / max(luminance(light.radiance), 1e-30));
+    return LightContribution(incidence.direction, incidence.distance, value, 0.0);
 }

@@ -3,6 +3,7 @@
 use super::settings::{self, Settings, Value, View};
 use crate::error::{Error, Result};
 use crate::output::MAX_SIDE;
+use crate::renderer::COMMON_VIEWS;
 use crate::scene::builtin;
 use crate::techniques;
 use serde::{Deserialize, Serialize};
@@ -59,6 +60,9 @@ pub struct Experiment {
     /// What moves during a run.
     #[serde(default)]
     pub motion: Option<Motion>,
+    /// A debug view that the strip shows in place of pictures.
+    #[serde(default)]
+    pub view: Option<String>,
     /// What `--quick` puts in place of the above.
     #[serde(default)]
     pub quick: Quick,
@@ -381,6 +385,9 @@ impl Experiment {
                 return bad("motion", "what moves is judged in one frame, which is not averaged".into());
             }
             let technique = self.technique(series);
+            if let Some(view) = self.view.as_deref().filter(|view| !has_view(technique, view)) {
+                return bad("view", format!("{technique} has no view '{view}'"));
+            }
             for place in &self.scenes {
                 settings::check(technique, &self.settings_of(place, series, None))?;
             }
@@ -427,6 +434,10 @@ impl Experiment {
         }
         all
     }
+}
+
+fn has_view(technique: &str, view: &str) -> bool {
+    techniques::find(technique).is_ok_and(|info| info.views.contains(&view)) || COMMON_VIEWS.contains(&view)
 }
 
 /// `WIDTHxHEIGHT` of a sweep over sizes.

@@ -7,7 +7,7 @@ use super::results::median;
 use super::settings::{self, Settings};
 use crate::error::{Error, Result};
 use crate::output::{Image, write_atomic};
-use crate::renderer::Renderer;
+use crate::renderer::{COMMON_VIEWS, Renderer};
 use crate::scene::Camera;
 use pollster::block_on;
 use serde::{Deserialize, Serialize};
@@ -149,6 +149,17 @@ impl Task<'_> {
             renderer.render_frame()?;
         }
         block_on(renderer.wait())
+    }
+
+    /// A debug view of the frame after the last one measured.
+    ///
+    /// # Errors
+    /// Those of rendering; `UNKNOWN_NAME` where the technique has no such view.
+    pub fn look(&self, renderer: &mut Renderer, view: &str) -> Result<Image> {
+        renderer.set_view(view)?;
+        let seen = renderer.render_frame().and_then(|()| block_on(renderer.read_image()));
+        renderer.set_view(COMMON_VIEWS[0])?;
+        seen
     }
 
     /// Renders and judges. Gives the numbers and the picture of the last frame.

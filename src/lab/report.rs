@@ -34,7 +34,7 @@ pub(super) fn write(findings: &Findings, folder: &Path) -> Result<Vec<PathBuf>> 
         let file = format!("{}{suffix}.png", findings.name);
         let tiles: Vec<PathBuf> = site.tiles.iter().map(|(_, path)| path.clone()).collect();
         strip::write(&folder.join(&file), &tiles)?;
-        let _ = write!(page, "\n![Pictures]({file})\n\n{}\n", strip_legend(site));
+        let _ = write!(page, "\n![Pictures]({file})\n\n{}\n", strip_legend(experiment, site));
         files.push(folder.join(&file));
     }
     write_atomic(&files[0], page.as_bytes())?;
@@ -139,11 +139,12 @@ fn equal_time_table(experiment: &Experiment, points: &[&Point]) -> String {
     table
 }
 
-fn strip_legend(site: &Site) -> String {
+fn strip_legend(experiment: &Experiment, site: &Site) -> String {
     let labels = site.tiles.chunks(strip::columns(site.tiles.len()));
     let rows: Vec<String> =
         labels.map(|row| row.iter().map(|(label, _)| label.as_str()).collect::<Vec<_>>().join(" | ")).collect();
-    format!("From the left, row by row, the first run's last frame: {}.", rows.join(" // "))
+    let what = experiment.view.as_ref().map_or(String::new(), |view| format!(", its view `{view}`"));
+    format!("From the left, row by row, the first run's last frame{what}: {}.", rows.join(" // "))
 }
 
 /// A plot of one metric; none where no point has it.

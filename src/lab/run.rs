@@ -215,7 +215,9 @@ impl Lab<'_> {
                 };
                 let identity = task.identity(&stand.reference.key, &adapter);
                 let name = key::of(&identity);
-                let [numbers, tile] = ["json", "png"].map(|e| self.points_folder.join(format!("{name}.{e}")));
+                let view = experiment.view.as_deref();
+                let numbers = self.points_folder.join(format!("{name}.json"));
+                let tile = self.points_folder.join(format!("{name}{}.png", view.unwrap_or_default().replace(' ', "-")));
                 // The strip shows the first run.
                 let kept =
                     if self.options.fresh || (number == 0 && !tile.exists()) { None } else { Run::read(&numbers) };
@@ -229,8 +231,10 @@ impl Lab<'_> {
                             task.warm_up(renderer)?;
                         }
                         let (run, picture) = task.measure(renderer, &stand.reference.image)?;
-                        if number == 0 {
-                            write_tile(&tile, &picture, exposure)?;
+                        match view {
+                            _ if number > 0 => {}
+                            None => write_tile(&tile, &picture, exposure)?,
+                            Some(view) => write_tile(&tile, &task.look(renderer, view)?, Exposure::of_views())?,
                         }
                         self.outcome.measured += 1;
                         keep(&numbers, &identity, run)?

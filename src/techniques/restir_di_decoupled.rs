@@ -52,6 +52,24 @@ pub struct Selection {
 }
 }
 
+crate::gpu_struct! {
+/// The surface that a pixel saw, as far as the target function of the next frame needs it.
+pub struct DomainRecord {
+    /// World space, metres, in the frame that saw it.
+    pub position: [f32; 3],
+    /// Of shading; octahedral, two 16-bit numbers.
+    pub normal: u32,
+    /// Of the triangle, likewise.
+    pub geometric_normal: u32,
+    /// Metalness and GGX's alpha, 16 bits each.
+    pub metallic_alpha: u32,
+    /// Luminance of F0, and F90; likewise.
+    pub f0_f90: u32,
+    /// Luminance of the base colour; below 0 where the pixel saw no surface.
+    pub albedo: f32,
+}
+}
+
 crate::params! {
     /// Parameters of `restir-di-decoupled`.
     pub struct RestirDiDecoupledParams {
@@ -104,7 +122,13 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
            decoupled, is too dark at the edges of shadows.",
     params: RestirDiDecoupledParams::SPECS,
     views: &["direct", "indirect", "candidate", "temporal", "spatiotemporal", "confidence weight", "light", "subset"],
-    layouts: &[TileLight::LAYOUT, DecoupledReservoir::LAYOUT, Selection::LAYOUT, RestirDiDecoupledParams::LAYOUT],
+    layouts: &[
+        TileLight::LAYOUT,
+        DecoupledReservoir::LAYOUT,
+        Selection::LAYOUT,
+        DomainRecord::LAYOUT,
+        RestirDiDecoupledParams::LAYOUT,
+    ],
     create: |gpu| Box::new(RestirDiDecoupled::new(gpu)),
 };
 
@@ -149,7 +173,9 @@ struct Buffers {
     selections: wgpu::Buffer,
     /// This frame's and the previous one's, in turn.
     reservoirs: [wgpu::Buffer; 2],
-    /// Which of them holds the previous frame's.
+    /// Likewise.
+    domains: [wgpu::Buffer; 2],
+    /// Which of each holds the previous frame's.
     history: usize,
     indirect: wgpu::TextureView,
 }
@@ -207,6 +233,10 @@ impl Technique for RestirDiDecoupled {
                 of_pixels("reservoirs", size_of::<DecoupledReservoir>())?,
                 of_pixels("reservoirs", size_of::<DecoupledReservoir>())?,
             ],
+            domains: [
+                of_pixels("domains", size_of::<DomainRecord>())?,
+                of_pixels("domains", size_of::<DomainRecord>())?,
+            ],
             history: 0,
             indirect: gpu.texture("restir-di-decoupled.indirect", size, wgpu::TextureFormat::Rgba32Float),
         });
@@ -215,7 +245,7 @@ impl Technique for RestirDiDecoupled {
 
     fn record(&mut self, recorder: &mut Recorder<'_>, size: UVec2) -> Result<()> {
         let Some(buffers) = &mut self.buffers else { return Ok(()) };
-        let history = &buffers.reservoirs[buffers.history];
+        let (previous, next) = (buffers.history, 1 - buffers.history);
         // Every other pixel of each row.
         let traced = UVec2::new(size.x.div_ceil(1 + self.params.checkerboard), size.y);
 
@@ -232,13 +262,14 @@ impl Technique for RestirDiDecoupled {
             .bind("tile_lights", &buffers.tile_lights)
             .bind("tile_inverse_pdfs", &buffers.tile_inverse_pdfs)
             .bind("selections", &buffers.selections)
+            .bind("domains_previous", &buffers.domains[previous])
             .dispatch_over(traced)?;
         if self.params.visibility != VISIBILITY_NONE {
             recorder
                 .pass(&table::RESTIR_DI_DECOUPLED_TRACE)
                 .bind("params", &self.uniform)
                 .bind("selections", &buffers.selections)
-                .bind("reservoirs_previous", history)
+                .bind("reservoirs_previous", &buffers.reservoirs[previous])
                 .dispatch_over(traced)?;
         }
         if self.params.indirect == 1 {
@@ -248,11 +279,13 @@ impl Technique for RestirDiDecoupled {
             .pass(&table::RESTIR_DI_DECOUPLED_SHADE)
             .bind("params", &self.uniform)
             .bind("selections", &buffers.selections)
-            .bind("reservoirs_previous", history)
-            .bind("reservoirs_out", &buffers.reservoirs[1 - buffers.history])
+            .bind("reservoirs_previous", &buffers.reservoirs[previous])
+            .bind("reservoirs_out", &buffers.reservoirs[next])
+            .bind("domains_previous", &buffers.domains[previous])
+            .bind("domains_out", &buffers.domains[next])
             .bind("indirect_radiance", &buffers.indirect)
             .dispatch_over(size)?;
-        buffers.history = 1 - buffers.history;
+        buffers.history = next;
         Ok(())
     }
 }

@@ -10,6 +10,7 @@ pub mod plate;
 pub mod statistics;
 pub mod twins;
 
+use restir::lab::truth::Margins;
 use restir::{FlatScene, Gpu, GpuOptions, Image, Renderer, Scene};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -25,6 +26,23 @@ pub fn gpu() -> Gpu {
 pub fn fresh_gpu() -> Gpu {
     pollster::block_on(Gpu::headless(&GpuOptions { default_limits: true }))
         .expect("a Vulkan driver (Debian: mesa-vulkan-drivers)")
+}
+
+/// Whether statistical proofs are made in full, as `npm run prove` does. `npm test` makes a quarter of the runs, which doubles errors,
+/// and allows twice the margin.
+pub fn is_whole() -> bool {
+    std::env::var_os("RESTIR_PROVE").is_some()
+}
+
+/// So many runs, or frames, of a proof in full; a quarter of them else.
+pub fn effort(count: u32) -> u32 {
+    if is_whole() { count } else { count.div_ceil(4) }
+}
+
+/// These margins of a proof in full; twice as wide else.
+pub fn margins(whole: Margins) -> Margins {
+    let factor = if is_whole() { 1.0 } else { 2.0 };
+    Margins { picture: factor * whole.picture, tile: factor * whole.tile }
 }
 
 /// Says that a test does not run, and why.

@@ -18,6 +18,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     // Zero, so never selected, where the density is none.
     let inverse_pdf = select(0.0, 1.0 / pdf, pdf > 0.0);
     let index = id.y * params.tile_lights + id.x;
-    tile_lights_out[index] = pack_tile_light(sample, inverse_pdf);
+    tile_lights_out[index] = resolve_light(sample, inverse_pdf).packed;
     tile_inverse_pdfs_out[index] = inverse_pdf;
 }

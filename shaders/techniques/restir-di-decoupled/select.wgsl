@@ -1,6 +1,6 @@
 // Kernel 1: selects a candidate from the light tiles, and the two pixels of the previous frame that it will meet.
-// One invocation: one pixel. Reads the light tiles, the visibility buffers and materials; no lights and no triangles of
-// lights. Writes the pixel's selection.
+// One invocation: one pixel. Reads the light tiles, the visibility buffer, materials and the previous frame's domains; no
+// lights and no triangles of lights. Writes the pixel's selection.
 // Source: Wyman and Panteleev 2021, section 5.2 (candidates), section 6.2 (neighbours, all of the previous frame),
 // section 4.3 (which of them are like enough).
 #include "techniques/common/reprojection.wgsl"
@@ -12,6 +12,7 @@
 @group(1) @binding(4) var<storage, read> tile_lights: array<TileLight>;
 @group(1) @binding(5) var<storage, read> tile_inverse_pdfs: array<f32>;
 @group(1) @binding(6) var<storage, read_write> selections: array<Selection>;
+@group(1) @binding(7) var<storage, read> domains_previous: array<DomainRecord>;
 
 // Resampled importance sampling of M lights, uniform in the tile's subset (Eq. 5, 10 and 13).
 fn select_candidate(pixel: vec2u, surface: Surface, selection: ptr<function, Selection>) {
@@ -21,6 +22,7 @@ fn select_candidate(pixel: vec2u, surface: Surface, selection: ptr<function, Sel
     var selected_weight = 0.0;
     var selected = 0u;
     var words = vec4f(0.0);
+    let domain = domain_of(surface);
     for (var i = 0u; i < params.candidates; i += 1u) {
         if i % 4u == 0u {
             words = random_4(&rng);
@@ -31,7 +33,7 @@ fn select_candidate(pixel: vec2u, surface: Surface, selection: ptr<function, Sel
         var weight = 0.0;
         if incidence.value > 0.0 {
             // p-hat / q, for both are in `value`.
-            weight = incidence.value * approximate_scatter(surface, incidence.direction, incidence.distance);
+            weight = incidence.value * pixel_scatter(surface, domain, incidence.direction, incidence.distance);
         }
         weight_sum += weight;
         if words.x * weight_sum < weight {
@@ -94,7 +96,7 @@ fn select_domains(pixel: vec2u, surface: Surface, selection: ptr<function, Selec
         if i > 0u && is_seen && all(candidate == center) {
             continue;
         }
-        if !is_similar(surface, depth, candidate) {
+        if !is_similar(surface, depth, domains_previous[pixel_index(candidate)]) {
             continue;
         }
         let domain = pack_domain(candidate, i == 0u || length(offset) < params.visibility_reuse_radius);

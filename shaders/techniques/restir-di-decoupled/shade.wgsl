@@ -1,11 +1,13 @@
 // Kernel 3: shades the candidate, the temporal and the spatiotemporal sample, and resamples one of them for the next frame.
-// One invocation: one pixel. Reads the selections, the previous frame's reservoirs, materials, lights and the indirect
-// radiance. Writes radiance, or a debug view, and the next frame's reservoir. Traces nothing.
+// One invocation: one pixel. Reads the selections, the previous frame's reservoirs and domains, materials, lights and the
+// indirect radiance. Writes radiance, or a debug view, and the pixel's reservoir and domain for the next frame. Traces
+// nothing.
 //
 // Domain i offers its sample x_i with resampling weight w_i = m_i(x_i) p-hat(x_i) W_i. All three are shaded with the
 // probability w_i / sum w that resampling would take them: sum_i (w_i / sum w) f(x_i) (sum w) / p-hat(x_i)
 // = sum_i m_i(x_i) f(x_i) W_i.
 // Source: Wyman and Panteleev 2021, section 7 (Fig. 13), Eq. 24 to 33; dissertation 004, Eq. 6.19 to 6.22.
+#include "techniques/common/shade.wgsl"
 #include "techniques/common/reprojection.wgsl"
 #include "techniques/restir-di-decoupled/params.wgsl"
 #include "techniques/restir-di-decoupled/target.wgsl"
@@ -16,7 +18,8 @@
 @group(1) @binding(5) var<storage, read> selections: array<Selection>;
 @group(1) @binding(6) var<storage, read> reservoirs_previous: array<DecoupledReservoir>;
 @group(1) @binding(7) var<storage, read_write> reservoirs_out: array<DecoupledReservoir>;
-@group(1) @binding(8) var indirect_radiance: texture_2d<f32>;
+@group(1) @binding(8) var<storage, read> domains_previous: array<DomainRecord>;
+@group(1) @binding(9) var<storage, read_write> domains_out: array<DomainRecord>;
 
 const VIEW_DIRECT = 1u;
 const VIEW_INDIRECT = 2u;
@@ -27,29 +30,15 @@ const VIEW_CONFIDENCE_WEIGHT = 6u;
 const VIEW_LIGHT = 7u;
 const VIEW_SUBSET = 8u;
 
-// The three samples of a pixel, component i that of domain i.
-struct Samples {
-    lights: vec3u,
-    points: vec3u,
-    weights: vec3f, // W_i
-    confidences: vec3f, // c_i; 0 where there is no domain
-    ages: vec3u, // of what is known of their visibility
-    visible: vec3<bool>, // V_0(x_i), as far as is known
-    resolved: array<TileLight, 3>, // where nothing moves: the same light for every domain, fetched once
-}
-
 // What a pixel shows of direct light, and hands on.
 struct Shaded {
-    contributions: array<vec3f, 3>, // m_i(x_i) f(x_i) V(x_i) W_i
+    direct: vec3f, // sum over i of m_i(x_i) f(x_i) V(x_i) W_i
+    viewed: vec3f, // the term of the sample that a debug view asks for
     reservoir: DecoupledReservoir,
 }
 
 fn empty_reservoir() -> DecoupledReservoir {
     return DecoupledReservoir(NONE, 0u, 0.0, 0u);
-}
-
-fn light_sample_of(samples: Samples, i: u32) -> LightSample {
-    return LightSample(samples.lights[i], samples.points[i]);
 }
 
 // A reservoir of the previous frame, taken to this one: of a light that has grown, the density has shrunk.
@@ -70,123 +59,138 @@ fn feeds_visibility(i: u32) -> bool {
         || params.visibility == VISIBILITY_MIS;
 }
 
-fn gather_samples(selection: Selection) -> Samples {
-    var samples = Samples(vec3u(selection.light, NONE, NONE), vec3u(selection.point, 0u, 0u),
-        vec3f(selection.unbiased_contribution_weight, 0.0, 0.0), vec3f(1.0, 0.0, 0.0), vec3u(0u), vec3<bool>(false),
-        array<TileLight, 3>());
-    let domains = vec3u(0u, selection.temporal, selection.spatiotemporal);
-    for (var i = 0u; i < DOMAINS; i += 1u) {
-        if i > 0u && domains[i] != NONE {
-            let reservoir = history_reservoir(domain_pixel(domains[i]));
-            let state = unpack_state(reservoir.state);
-            samples.lights[i] = reservoir.light;
-            samples.points[i] = reservoir.point;
-            samples.weights[i] = reservoir.unbiased_contribution_weight;
-            samples.confidences[i] = min(state.confidence_weight, params.history_cap);
-            let was_traced = (selection.visibility & traced_bit(i)) != 0u;
-            samples.ages[i] = select(state.age + 1u, 0u, was_traced);
-        }
-        samples.visible[i] = params.visibility == VISIBILITY_NONE
-            || (selection.visibility & visibility_bit(0u, i)) != 0u;
-        if feeds_visibility(i) && !samples.visible[i] {
-            samples.weights[i] = 0.0;
-            if i > 0u && params.visibility == VISIBILITY_DISCARD {
-                samples.confidences[i] = 0.0;
-            }
-        }
-        if !scene_has_motion && samples.weights[i] > 0.0 {
-            samples.resolved[i] = pack_tile_light(light_sample_of(samples, i), 1.0);
-        }
-    }
-    return samples;
+// One of the three samples of a pixel.
+struct Sample {
+    light: LightSample,
+    unbiased_contribution_weight: f32, // W_i
+    age: u32, // of what is known of its visibility
+    is_visible: bool, // V_0(x_i), as far as is known
 }
 
-// p-hat_j(x_i).
-fn domain_target(domain: Surface, samples: Samples, i: u32, previous: bool) -> f32 {
-    if scene_has_motion {
-        return approximate_target(domain, light_sample_of(samples, i), previous);
-    }
-    let incidence = tile_incidence(samples.resolved[i], domain.position);
-    if incidence.value <= 0.0 {
+// Where sample i comes from: a pixel of the previous frame, or, of the candidate, none.
+fn domain_of_sample(selection: Selection, i: u32) -> u32 {
+    return select(selection.temporal, selection.spatiotemporal, i == SPATIOTEMPORAL);
+}
+
+fn sample_is_visible_here(selection: Selection, i: u32) -> bool {
+    return params.visibility == VISIBILITY_NONE || (selection.visibility & visibility_bit(0u, i)) != 0u;
+}
+
+// c_i in frames; 0 where there is no domain, or where its history is thrown away with its shadowed sample.
+fn domain_confidence(selection: Selection, i: u32) -> f32 {
+    let domain = domain_of_sample(selection, i);
+    if domain == NONE || (params.visibility == VISIBILITY_DISCARD && !sample_is_visible_here(selection, i)) {
         return 0.0;
     }
-    return incidence.value * approximate_scatter(domain, incidence.direction, incidence.distance);
+    let state = unpack_state(reservoirs_previous[pixel_index(domain_pixel(domain))].state);
+    return min(state.confidence_weight, params.history_cap);
 }
 
-fn shade_samples(pixel: vec2u, surface: Surface, selection: Selection) -> Shaded {
-    let samples = gather_samples(selection);
-    let domains = vec3u(0u, selection.temporal, selection.spatiotemporal);
-    // What each domain makes of each sample: p-hat of this pixel, and sums over domains for the MIS weights.
-    var targets = vec3f(0.0);
-    var numerators = vec3f(0.0);
-    var denominators = vec3f(0.0);
-    let domain_count = select(DOMAINS, 1u, params.bias_correction == REUSE_WEIGHT_NONE);
-    for (var j = 0u; j < domain_count; j += 1u) {
-        if samples.confidences[j] <= 0.0 {
+// A sample without weight is none, or shadowed and kept from being resampled.
+fn gather_sample(selection: Selection, i: u32) -> Sample {
+    let is_visible = sample_is_visible_here(selection, i);
+    var sample = Sample(LightSample(selection.light, selection.point), selection.unbiased_contribution_weight, 0u, is_visible);
+    if i != CANDIDATE {
+        let reservoir = history_reservoir(domain_pixel(domain_of_sample(selection, i)));
+        let was_traced = (selection.visibility & traced_bit(i)) != 0u;
+        let age = select(unpack_state(reservoir.state).age + 1u, 0u, was_traced);
+        sample = Sample(LightSample(reservoir.light, reservoir.point), reservoir.unbiased_contribution_weight, age, is_visible);
+    }
+    if feeds_visibility(i) && !is_visible {
+        sample.unbiased_contribution_weight = 0.0;
+    }
+    return sample;
+}
+
+// p-hat_j(x) of a pixel of the previous frame, with the light as it was then.
+fn domain_target(domain: Domain, light: ResolvedLight) -> f32 {
+    if scene_has_motion {
+        let before = light_contribution(tile_light_sample(light.packed), domain.position, true);
+        return luminance(before.value) * approximate_scatter(domain, before.direction);
+    }
+    let incidence = tile_incidence(light.packed, domain.position);
+    return incidence.value * approximate_scatter(domain, incidence.direction);
+}
+
+// m_i(x_i), by what each domain makes of the sample: p-hat_0 is `own_target`.
+fn mis_weight_of(i: u32, selection: Selection, confidences: vec3f, light: ResolvedLight, own_target: f32) -> f32 {
+    if params.bias_correction == REUSE_WEIGHT_NONE {
+        return confidences[i] / (confidences.x + confidences.y + confidences.z);
+    }
+    var numerator = 0.0;
+    var denominator = 0.0;
+    for (var j = 0u; j < DOMAINS; j += 1u) {
+        if confidences[j] <= 0.0 {
             continue;
         }
-        var domain = surface;
+        var value = own_target;
         if j > 0u {
-            domain = load_pixel_of(domain_pixel(domains[j]), true);
+            let record = domains_previous[pixel_index(domain_pixel(domain_of_sample(selection, j)))];
+            value = domain_target(unpack_domain_record(record, frame.previous_camera), light);
         }
-        for (var i = 0u; i < DOMAINS; i += 1u) {
-            if samples.weights[i] <= 0.0 {
-                continue;
-            }
-            var value = domain_target(domain, samples, i, j > 0u);
-            if j == 0u {
-                targets[i] = value;
-            }
-            if params.visibility == VISIBILITY_MIS && (selection.visibility & visibility_bit(j, i)) == 0u {
-                value = 0.0;
-            }
-            var share = samples.confidences[j] * value;
-            if params.bias_correction == REUSE_WEIGHT_Z {
-                share = select(0.0, samples.confidences[j], value > 0.0);
-            }
-            denominators[i] += share;
-            if i == j {
-                numerators[i] = share;
-            }
+        if params.visibility == VISIBILITY_MIS && (selection.visibility & visibility_bit(j, i)) == 0u {
+            value = 0.0;
+        }
+        var share = confidences[j] * value;
+        if params.bias_correction == REUSE_WEIGHT_Z {
+            share = select(0.0, confidences[j], value > 0.0);
+        }
+        denominator += share;
+        if i == j {
+            numerator = share;
         }
     }
-    if params.bias_correction == REUSE_WEIGHT_NONE {
-        numerators = samples.confidences;
-        denominators = vec3f(samples.confidences.x + samples.confidences.y + samples.confidences.z);
-    }
+    return numerator / max(denominator, 1e-37);
+}
 
+fn shade_samples(pixel: vec2u, surface: Surface, own: Domain, selection: Selection) -> Shaded {
+    let confidences = vec3f(1.0, domain_confidence(selection, TEMPORAL), domain_confidence(selection, SPATIOTEMPORAL));
     var rng = rng_new(pixel, frame.index, frame.seed, STREAM_DECOUPLED);
     let u = random_4(&rng);
     var shaded: Shaded;
     var weight_sum = 0.0;
-    var selected = NONE;
+    var selected: Sample;
+    var selected_target = 0.0;
     for (var i = 0u; i < DOMAINS; i += 1u) {
-        shaded.contributions[i] = vec3f(0.0);
-        if targets[i] <= 0.0 || denominators[i] <= 0.0 {
+        if confidences[i] <= 0.0 {
             continue;
         }
-        let share = numerators[i] / denominators[i] * samples.weights[i];
-        let weight = share * targets[i];
+        let sample = gather_sample(selection, i);
+        if sample.unbiased_contribution_weight <= 0.0 {
+            continue;
+        }
+        let light = resolve_light(sample.light, 1.0);
+        let incidence = tile_incidence(light.packed, own.position);
+        // p-hat_0(x_i).
+        let own_target = incidence.value * pixel_scatter(surface, own, incidence.direction, incidence.distance);
+        if own_target <= 0.0 {
+            continue;
+        }
+        let share = mis_weight_of(i, selection, confidences, light, own_target) * sample.unbiased_contribution_weight;
+        let weight = share * own_target;
         weight_sum += weight;
         if u[i] * weight_sum < weight {
-            selected = i;
+            selected = sample;
+            selected_target = own_target;
         }
-        if samples.visible[i] {
-            let light = light_contribution(light_sample_of(samples, i), surface.position, false);
-            shaded.contributions[i] = share * light.value * direct_scatter(surface, light.direction, light.distance);
+        if sample.is_visible {
+            let incident = resolved_contribution(light, surface.position);
+            let contribution = share * incident.value * direct_scatter(surface, incident.direction, incident.distance);
+            shaded.direct += contribution;
+            if frame.view == VIEW_CANDIDATE + i {
+                shaded.viewed = contribution;
+            }
         }
     }
 
     shaded.reservoir = empty_reservoir();
-    var state = ReservoirState(samples.confidences.x + samples.confidences.y + samples.confidences.z, false, 0u);
-    if selected != NONE {
-        let weight = weight_sum / targets[selected];
+    var state = ReservoirState(confidences.x + confidences.y + confidences.z, false, 0u);
+    if selected_target > 0.0 {
+        let weight = weight_sum / selected_target;
         if !is_nan(weight) && !is_infinite(weight) {
-            shaded.reservoir.light = samples.lights[selected];
-            shaded.reservoir.point = samples.points[selected];
-            shaded.reservoir.unbiased_contribution_weight = weight;
-            state.is_visible = samples.visible[selected];
-            state.age = samples.ages[selected];
+            shaded.reservoir = DecoupledReservoir(selected.light.light, selected.light.point, weight, 0u);
+            state.is_visible = selected.is_visible;
+            state.age = selected.age;
         }
     }
     shaded.reservoir.state = pack_state(state);
@@ -197,16 +201,13 @@ fn shade_samples(pixel: vec2u, surface: Surface, selection: Selection) -> Shaded
 // point that was not seen then shows the candidate of the pixel beside it.
 fn shade_left_out(pixel: vec2u, surface: Surface) -> Shaded {
     var shaded: Shaded;
-    shaded.contributions[CANDIDATE] = vec3f(0.0);
-    shaded.contributions[TEMPORAL] = vec3f(0.0);
-    shaded.contributions[SPATIOTEMPORAL] = vec3f(0.0);
     shaded.reservoir = empty_reservoir();
     var origin = CANDIDATE;
     var is_visible = false;
     if frame.history == 1u && params.temporal_reuse == 1u {
         let position = previous_position(pixel);
         let film = project(frame.previous_camera, position);
-        if is_on_film(film) && is_similar(surface, previous_depth(position), vec2u(film)) {
+        if is_on_film(film) && is_similar(surface, previous_depth(position), domains_previous[pixel_index(vec2u(film))]) {
             origin = TEMPORAL;
             shaded.reservoir = history_reservoir(vec2u(film));
             var state = unpack_state(shaded.reservoir.state);
@@ -227,55 +228,44 @@ fn shade_left_out(pixel: vec2u, surface: Surface) -> Shaded {
     }
     if is_visible && shown.unbiased_contribution_weight > 0.0 {
         let light = light_contribution(LightSample(shown.light, shown.point), surface.position, false);
-        shaded.contributions[origin] = shown.unbiased_contribution_weight * light.value
+        shaded.direct = shown.unbiased_contribution_weight * light.value
             * direct_scatter(surface, light.direction, light.distance);
+        shaded.viewed = select(vec3f(0.0), shaded.direct, frame.view == VIEW_CANDIDATE + origin);
     }
     return shaded;
-}
-
-// A colour that a number can be told by.
-fn number_color(number: u32) -> vec3f {
-    return vec3f(pcg4d(vec4u(number, 1u, 2u, 3u)).xyz >> vec3u(8u)) * 5.9604645e-8;
-}
-
-fn indirect_light(pixel: vec2u) -> vec3f {
-    if params.indirect == 0u {
-        return vec3f(0.0);
-    }
-    return textureLoad(indirect_radiance, pixel, 0).rgb;
 }
 
 fn shade_pixel(pixel: vec2u) -> vec3f {
     if !pixel_has_surface(pixel) {
         reservoirs_out[pixel_index(pixel)] = empty_reservoir();
+        domains_out[pixel_index(pixel)] = record_without_surface();
         return select(vec3f(0.0), environment_evaluate(primary_ray(pixel).direction), frame.view == 0u);
     }
-    let surface = load_pixel_of(pixel, false);
+    let surface = load_pixel(pixel);
+    let domain = domain_of(surface);
+    domains_out[pixel_index(pixel)] = pack_domain_record(domain);
     var shaded: Shaded;
     if frame.light_count == 0u {
         shaded.reservoir = empty_reservoir();
     } else if is_left_out(pixel) {
         shaded = shade_left_out(pixel, surface);
     } else {
-        shaded = shade_samples(pixel, surface, selections[pixel_index(pixel)]);
+        shaded = shade_samples(pixel, surface, domain, selections[pixel_index(pixel)]);
     }
     reservoirs_out[pixel_index(pixel)] = shaded.reservoir;
-    let direct = shaded.contributions[CANDIDATE] + shaded.contributions[TEMPORAL] + shaded.contributions[SPATIOTEMPORAL];
     switch frame.view {
-        case VIEW_DIRECT: { return direct; }
-        case VIEW_INDIRECT: { return indirect_light(pixel); }
-        case VIEW_CANDIDATE: { return shaded.contributions[CANDIDATE]; }
-        case VIEW_TEMPORAL: { return shaded.contributions[TEMPORAL]; }
-        case VIEW_SPATIOTEMPORAL: { return shaded.contributions[SPATIOTEMPORAL]; }
+        case VIEW_DIRECT: { return shaded.direct; }
+        case VIEW_INDIRECT: { return indirect_light(pixel, params.indirect); }
+        case VIEW_CANDIDATE, VIEW_TEMPORAL, VIEW_SPATIOTEMPORAL: { return shaded.viewed; }
         // White at the most that a pixel can have: its own, and two histories.
         case VIEW_CONFIDENCE_WEIGHT: {
             return vec3f(unpack_state(shaded.reservoir.state).confidence_weight / (1.0 + 2.0 * params.history_cap));
         }
         case VIEW_LIGHT: {
-            return select(number_color(shaded.reservoir.light), vec3f(0.0), shaded.reservoir.light == NONE);
+            return number_color(shaded.reservoir.light);
         }
         case VIEW_SUBSET: { return number_color(tile_subset(pixel)); }
-        default: { return surface.emission + direct + indirect_light(pixel); }
+        default: { return surface.emission + shaded.direct + indirect_light(pixel, params.indirect); }
     }
 }
 

@@ -53,17 +53,26 @@ fn trace_pixel(pixel: vec2u) {
 
     var bits = 0u;
     var rays = 0u;
-    let domain_count = select(1u, DOMAINS, params.visibility == VISIBILITY_MIS);
-    for (var j = 0u; j < domain_count; j += 1u) {
-        if j > 0u && domains[j] == NONE {
-            continue;
-        }
-        var place = pixel;
-        if j > 0u {
-            place = domain_pixel(domains[j]);
-        }
-        let surface = domain_surface(place, j > 0u);
-        for (var i = 0u; i < DOMAINS; i += 1u) {
+    var surface: Surface;
+    let pairs = select(DOMAINS, DOMAINS * DOMAINS, params.visibility == VISIBILITY_MIS);
+    // Pair k is sample i seen from domain j, and bit k of the answer. Each turn goes on to the next pair that wants a ray, so
+    // that neighbouring invocations trace at the same time, whichever pairs are theirs.
+    for (var k = 0u; k < pairs; ) {
+        var wants_ray = false;
+        var light: LightContribution;
+        for (; k < pairs && !wants_ray; k += 1u) {
+            let j = k / DOMAINS;
+            let i = k % DOMAINS;
+            if j > 0u && domains[j] == NONE {
+                continue;
+            }
+            if i == 0u {
+                var place = pixel;
+                if j > 0u {
+                    place = domain_pixel(domains[j]);
+                }
+                surface = domain_surface(place, j > 0u);
+            }
             if !has_sample[i] {
                 continue;
             }
@@ -90,18 +99,21 @@ fn trace_pixel(pixel: vec2u) {
                     }
                 }
             }
-            let light = light_contribution(LightSample(lights_of[i], points[i]), surface.position, j > 0u);
+            light = light_contribution(LightSample(lights_of[i], points[i]), surface.position, j > 0u);
             if j == 0u {
                 bits |= traced_bit(i);
             }
-            if luminance(light.value) <= 0.0 || (!scene_has_transmission && !above_surface(surface, light.direction)) {
-                continue;
-            }
-            rays += 1u;
-            let top_level = select(frame.top_level, frame.previous_top_level, j > 0u);
-            if is_visible_from(top_level, surface, light.direction, light.distance) {
-                bits |= visibility_bit(j, i);
-            }
+            wants_ray = luminance(light.value) > 0.0
+                && (scene_has_transmission || above_surface(surface, light.direction));
+        }
+        if !wants_ray {
+            break;
+        }
+        rays += 1u;
+        let pair = k - 1u;
+        let top_level = select(frame.top_level, frame.previous_top_level, pair >= DOMAINS);
+        if is_visible_from(top_level, surface, light.direction, light.distance) {
+            bits |= 1u << pair;
         }
     }
     selections[index].visibility = bits;

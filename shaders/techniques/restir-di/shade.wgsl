@@ -2,13 +2,13 @@
 // One invocation: one pixel. Reads the visibility buffer, the final reservoirs and the indirect radiance. Writes
 // radiance, or a debug view.
 // Source: Bitterli et al. 2020, Algorithm 5, lines 20 to 22; thesis 001, section 5.5 (several slots are averaged).
+#include "techniques/common/shade.wgsl"
 #include "scene/visibility_buffer.wgsl"
 #include "scene/counters.wgsl"
 #include "techniques/common/resampling.wgsl"
 #include "techniques/restir-di/reservoirs.wgsl"
 
 @group(1) @binding(2) var radiance_out: texture_storage_2d<rgba32float, write>;
-@group(1) @binding(7) var indirect_radiance: texture_2d<f32>;
 
 const VIEW_DIRECT = 1u;
 const VIEW_INDIRECT = 2u;
@@ -16,14 +16,6 @@ const VIEW_CONTRIBUTION_WEIGHT = 3u;
 const VIEW_CONFIDENCE_WEIGHT = 4u;
 const VIEW_LIGHT = 5u;
 const VIEW_DUPLICATES = 6u;
-
-// A colour a light can be told by.
-fn light_color(light: u32) -> vec3f {
-    if light == NONE {
-        return vec3f(0.0);
-    }
-    return vec3f(pcg4d(vec4u(light, 1u, 2u, 3u)).xyz >> vec3u(8u)) * 5.9604645e-8;
-}
 
 // How many of the pixels within `DUPLICATES_RADIUS` hold the very sample that this one holds, as a share of them: black where
 // none does, over red and yellow to white where all do (Wyman and Panteleev 2021, Figure 9).
@@ -48,13 +40,6 @@ fn duplicates_color(pixel: vec2u, own: Reservoir) -> vec3f {
     return clamp(vec3f(heat, heat - 1.0, heat - 2.0), vec3f(0.0), vec3f(1.0));
 }
 
-fn indirect_light(pixel: vec2u) -> vec3f {
-    if params.indirect == 0u {
-        return vec3f(0.0);
-    }
-    return textureLoad(indirect_radiance, pixel, 0).rgb;
-}
-
 fn pixel_radiance(pixel: vec2u) -> vec3f {
     if !pixel_has_surface(pixel) {
         return select(vec3f(0.0), environment_evaluate(primary_ray(pixel).direction), frame.view == 0u);
@@ -63,7 +48,7 @@ fn pixel_radiance(pixel: vec2u) -> vec3f {
     let slots = slot_count();
     let first = load_reservoir(pixel, 0u);
     switch frame.view {
-        case VIEW_INDIRECT: { return indirect_light(pixel); }
+        case VIEW_INDIRECT: { return indirect_light(pixel, params.indirect); }
         // W times p-hat is the estimate itself up to visibility, hence dimensionless enough to look at.
         case VIEW_CONTRIBUTION_WEIGHT: {
             return vec3f(first.unbiased_contribution_weight * target_function(surface, reservoir_sample(first), false));
@@ -73,7 +58,7 @@ fn pixel_radiance(pixel: vec2u) -> vec3f {
             let neighbors = f32(params.spatial_reuse * params.spatial_iterations * params.spatial_neighbors);
             return vec3f(first.confidence_weight / ((params.history_cap + 1.0) * (1.0 + neighbors)));
         }
-        case VIEW_LIGHT: { return light_color(first.light); }
+        case VIEW_LIGHT: { return number_color(first.light); }
         case VIEW_DUPLICATES: { return duplicates_color(pixel, first); }
         default: {}
     }
@@ -85,7 +70,7 @@ fn pixel_radiance(pixel: vec2u) -> vec3f {
     if frame.view == VIEW_DIRECT {
         return direct;
     }
-    return surface.emission + direct + indirect_light(pixel);
+    return surface.emission + direct + indirect_light(pixel, params.indirect);
 }
 
 @compute @workgroup_size(8, 8)

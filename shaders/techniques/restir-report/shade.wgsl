@@ -3,13 +3,13 @@
 // a debug view.
 // Source: report 003, sections 4.3 and 4.4. Its power heuristic between strategies has nothing to weigh here: no light is in
 // two strategies, and the hemisphere samples of the indirect light leave out what lights send straight to the surface.
+#include "techniques/common/shade.wgsl"
 #include "scene/visibility_buffer.wgsl"
 #include "scene/counters.wgsl"
 #include "techniques/restir-report/reservoir.wgsl"
 
 @group(1) @binding(2) var radiance_out: texture_storage_2d<rgba32float, write>;
 @group(1) @binding(4) var<storage, read> reservoirs: array<ReportReservoir>;
-@group(1) @binding(5) var indirect_radiance: texture_2d<f32>;
 
 const VIEW_AREA = 1u;
 const VIEW_POINT = 2u;
@@ -31,13 +31,6 @@ fn shade_strategy(surface: Surface, pixel: vec2u, strategy: u32) -> vec3f {
     return shade_reservoir(surface, Reservoir(reservoir.light, reservoir.point, weight, reservoir.samples_count));
 }
 
-fn indirect_light(pixel: vec2u) -> vec3f {
-    if params.indirect == 0u {
-        return vec3f(0.0);
-    }
-    return textureLoad(indirect_radiance, pixel, 0).rgb;
-}
-
 fn pixel_radiance(pixel: vec2u) -> vec3f {
     if !pixel_has_surface(pixel) {
         return select(vec3f(0.0), environment_evaluate(primary_ray(pixel).direction), frame.view == 0u);
@@ -45,7 +38,7 @@ fn pixel_radiance(pixel: vec2u) -> vec3f {
     let area = reservoirs[reservoir_index(pixel, STRATEGY_AREA)];
     let point = reservoirs[reservoir_index(pixel, STRATEGY_POINT)];
     if frame.view == VIEW_INDIRECT {
-        return indirect_light(pixel);
+        return indirect_light(pixel, params.indirect);
     }
     // Red: area lights, green: point lights. Full at what a pixel and its history can have seen, and a neighbour as much.
     if frame.view == VIEW_SAMPLES_COUNT {
@@ -68,7 +61,7 @@ fn pixel_radiance(pixel: vec2u) -> vec3f {
     if frame.view != 0u {
         return radiance;
     }
-    return surface.emission + radiance + indirect_light(pixel);
+    return surface.emission + radiance + indirect_light(pixel, params.indirect);
 }
 
 @compute @workgroup_size(8, 8)

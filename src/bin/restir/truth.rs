@@ -13,7 +13,7 @@ pub struct Args {
     /// Technique id; all that make claims where none is given.
     #[arg(value_name = "TECHNIQUE")]
     technique: Option<String>,
-    /// A quarter of the runs: can find a bias, but not show that there is none.
+    /// A quarter of the runs, and twice the margin.
     #[arg(long)]
     quick: bool,
     /// Print JSON.
