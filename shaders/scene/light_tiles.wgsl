@@ -67,7 +67,7 @@ fn pack_tile_light(sample: LightSample, inverse_pdf: f32) -> TileLight {
         let uv = light_sample_barycentrics(sample);
         packed.place = triangle_point(instance, triangle, uv);
         // Seen at a right angle, where a clearcoat dims least: never zero where the light is not.
-        let value = luminance(emitted_radiance(triangle, uv, 1.0)) * inverse_pdf;
+        let value = luminance(emitted_radiance(triangle, uv, 1.0)) * emitter_power(light, false) * inverse_pdf;
         packed.weight = front_normal(instance, triangle, uv) * value;
         if (load_triangle(triangle).flags & TRIANGLE_DOUBLE_SIDED) != 0u {
             packed.light |= TILE_LIGHT_TWO_SIDED << TILE_LIGHT_KIND_SHIFT;
