@@ -463,7 +463,7 @@ fn pointers_elsewhere_are_a_warning_and_broken_ones_are_refused() {
 }
 
 /// Milliseconds of the table, and of a whole change on the device, for 1000, 100,000 and a million lights of which a sixteenth
-/// is switched: `cargo test --release --test switching -- --ignored --nocapture`.
+/// is switched: `cargo test --test switching -- --ignored --nocapture`.
 #[test]
 #[ignore = "it measures"]
 fn how_long_the_table_takes() {
