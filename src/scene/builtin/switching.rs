@@ -109,7 +109,7 @@ fn lamp(scene: &mut Scene, i: u32) {
     let is_on = |key: u32| (key as f32 / KEYS as f32 - phase).rem_euclid(1.0) < SHARE;
     let times: Vec<f32> = (0..=KEYS).map(|key| key as f32 / KEYS as f32 * DURATION).collect();
     let values: Vec<f32> = (0..=KEYS).map(|key| f32::from(u8::from(is_on(key % KEYS)))).collect();
-    scene.rig.add_power_channel(power, if i % 2 == 0 { STEP } else { LINEAR }, &times, &values);
+    scene.rig.add_power_channel(power, if i.is_multiple_of(2) { STEP } else { LINEAR }, &times, &values);
 }
 
 #[cfg(test)]

@@ -70,8 +70,8 @@ impl Rig {
             let local = node.local();
             world.push(world.get(node.parent as usize).map_or(local, |parent| *parent * local));
         }
-        // A spline may swing below its keyframes.
-        powers.iter_mut().for_each(|power| *power = power.max(0.0).min(f32::MAX));
+        // A spline may swing below its keyframes, or out of all numbers.
+        powers.iter_mut().for_each(|power| *power = if power.is_finite() { power.max(0.0) } else { 0.0 });
         Pose { world, weights, powers }
     }
 }
