@@ -151,7 +151,7 @@ impl GpuScene {
     pub fn take_stage(&mut self, gpu: &Gpu, scene: &FlatScene, stage: &Stage) {
         if let Some(mut motion) = self.motion.take() {
             if motion.version != Some(stage.version()) {
-                motion.take_shapes(gpu, self, scene, stage);
+                motion.take_shapes(gpu, self, stage);
                 motion.version = Some(stage.version());
                 motion.at_rest = false;
             } else if !motion.at_rest {
@@ -252,6 +252,7 @@ fn features(scene: &FlatScene) -> SceneFeatures {
         environment_pyramid: false,
         shapes: scene.triangles.iter().any(|t| t.shape() != Shape::Triangles),
         punctual_lights: scene.lights.iter().any(|l| l.kind != LIGHT_TRIANGLE && !is_distant(l)),
+        dimmed_emitters: scene.light_powers.iter().take(scene.first_punctual as usize).any(|&power| power != NONE),
         instances: scene.has_top_level(),
         motion: !scene.rig.is_still(),
         many_triangles: motion::triangle_count(scene) > FIRST_TRIANGLES,

@@ -366,7 +366,7 @@ fn cameras_move_through_everything() {
 /// Where the first moving light is now, and where it was in the frame before.
 fn moving_light(renderer: &Renderer) -> [Vec3; 2] {
     let (stage, light) = (renderer.stage(), renderer.scene().rig.lights[0].target as usize);
-    [stage.lights[light].position, stage.previous_lights[light].position]
+    [stage.punctual_lights()[light].position, stage.previous_lights[light].position]
 }
 
 #[test]

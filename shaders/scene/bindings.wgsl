@@ -103,7 +103,7 @@ struct Light {
     kind: u32,
     direction: vec3f,
     range: f32,
-    intensity: vec3f,
+    intensity: vec3f, // of an emissive triangle factors on its emission: x in this frame, y in the previous one
     cos_outer: f32,
     cos_inner: f32,
     pmf: f32, // p(light)
@@ -127,11 +127,13 @@ override scene_has_sun: bool = true;
 // Primitives other than triangles.
 override scene_has_shapes: bool = true;
 override scene_has_punctual_lights: bool = true;
+// Emissive triangles that change their power.
+override scene_has_dimmed_emitters: bool = true;
 // How texels of the environment are drawn: by the pyramid of weights, or by the alias table.
 override scene_has_environment_pyramid: bool = true;
 // More than one instance: else there is one, that of what never moves, in world space.
 override scene_has_instances: bool = true;
-// Anything that is not where it was in the previous frame: else that frame's scene is this one's.
+// Anything that is not where it was in the previous frame, or not as bright: else that frame's scene is this one's.
 override scene_has_motion: bool = true;
 // More triangles than one storage binding holds.
 override scene_has_many_triangles: bool = true;

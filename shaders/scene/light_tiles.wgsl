@@ -73,7 +73,7 @@ fn resolve_light(sample: LightSample, inverse_pdf: f32) -> ResolvedLight {
         let uv = light_sample_barycentrics(sample);
         packed.place = triangle_point(instance, triangle, uv);
         // Seen at a right angle, where a clearcoat dims least: never zero where the light is not.
-        let radiance = emitted_radiance(triangle, uv, 1.0);
+        let radiance = emitted_radiance(triangle, uv, 1.0) * emitter_power(light, false);
         packed.weight = front_normal(instance, triangle, uv) * (luminance(radiance) * inverse_pdf);
         if (load_triangle(triangle).flags & TRIANGLE_DOUBLE_SIDED) != 0u {
             packed.light |= TILE_LIGHT_TWO_SIDED << TILE_LIGHT_KIND_SHIFT;

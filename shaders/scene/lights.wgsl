@@ -270,6 +270,29 @@ fn light_growth(light: u32) -> f32 {
     return select(0.0, triangle_area(instance, triangle) / before, before > 1e-30);
 }
 
+// Whether a light shines at all in this frame.
+fn is_switched_on(light: u32) -> bool {
+    let kind = lights[light].kind;
+    if kind == LIGHT_TRIANGLE {
+        return emitter_power(light, false) > 0.0;
+    }
+    return kind >= LIGHT_ENVIRONMENT || any(lights[light].intensity > vec3f(0.0));
+}
+
+// By what the contribution weight W of a sample that the previous frame held is multiplied in this one: the Jacobian of the
+// shift; or 0 for a light that has been switched off, so that the sample is dropped before anything is evaluated or traced
+// for it.
+// The confidence of such a reservoir stays as it is. Its history might have held any other light, so its share of the MIS
+// weights belongs to the samples of those; leaving it out only where the light is dead would choose by the sample, and be
+// too bright. Nor does it make the picture dark: the share that it has of a sample is what its own target function says, with
+// the powers of that frame, and so 0 for a light that was dark then and could not have been drawn.
+fn history_factor(light: u32) -> f32 {
+    if !scene_has_motion {
+        return 1.0;
+    }
+    return select(0.0, light_growth(light), is_switched_on(light));
+}
+
 // What a light sample sends to a point, unshadowed. `previous` asks for the light as it was in the previous frame; the
 // measure stays this frame's.
 fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> LightContribution {
@@ -298,8 +321,8 @@ fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> L
             return LightContribution(direction, distance, vec3f(0.0), 0.0);
         }
         let free = max(distance - shadow_margin(instance, triangle, position) / cosine, 0.0);
-        return LightContribution(direction, free, emitted_radiance(triangle, uv, cosine) * (cosine / distance_2 / growth),
-            distance_2 / cosine);
+        let scale = emitter_power(light, previous) * (cosine / distance_2 / growth);
+        return LightContribution(direction, free, emitted_radiance(triangle, uv, cosine) * scale, distance_2 / cosine);
     }
     if scene_has_environment && kind == LIGHT_ENVIRONMENT {
         let uv = unpack_point(sample.point);
@@ -315,7 +338,7 @@ fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> L
     }
     let punctual = select(light, lights[light].previous, previous && scene_has_motion);
     if kind == LIGHT_DIRECTIONAL {
-        return LightContribution(-lights[punctual].direction, ENVIRONMENT_DISTANCE, lights[light].intensity, 0.0);
+        return LightContribution(-lights[punctual].direction, ENVIRONMENT_DISTANCE, lights[punctual].intensity, 0.0);
     }
     let to_light = lights[punctual].position - position;
     let distance = length(to_light);
@@ -328,5 +351,5 @@ fn light_contribution(sample: LightSample, position: vec3f, previous: bool) -> L
     if kind == LIGHT_SPOT {
         attenuation *= cone_attenuation(punctual, direction);
     }
-    return LightContribution(direction, distance, lights[light].intensity * attenuation, 0.0);
+    return LightContribution(direction, distance, lights[punctual].intensity * attenuation, 0.0);
 }

@@ -111,7 +111,7 @@ fn triangle_error(instance: u32, triangle: u32, unit_normal: vec3f) -> f32 {
     return select(error, 4.0 * (error + 1.2e-7 * max(largest.x, max(largest.y, largest.z))), scene_has_instances);
 }
 
-// Radiance that a point of an emissive triangle sends out of its front, at a cosine to its normal; black where its alpha
+// Radiance that a point of an emissive triangle sends out of its front at full power, at a cosine to its normal; black where its alpha
 // mask cuts it away. A clearcoat dims it (KHR_materials_clearcoat). Read at level 0 however it was found, and dimmed by the
 // mesh's own normal, so that a light is the same to the ray that hits it and to the sample that chose it.
 fn emitted_radiance(triangle: u32, uv: vec2f, cosine: f32) -> vec3f {
@@ -128,6 +128,14 @@ fn emitted_radiance(triangle: u32, uv: vec2f, cosine: f32) -> vec3f {
         radiance *= 1.0 - coat * mix(CLEARCOAT_F0, 1.0, schlick_weight(cosine));
     }
     return radiance;
+}
+
+// Factor on what an emissive triangle sends out, in this frame or in the previous one.
+fn emitter_power(light: u32, previous: bool) -> f32 {
+    if !scene_has_dimmed_emitters {
+        return 1.0;
+    }
+    return select(lights[light].intensity.x, lights[light].intensity.y, previous);
 }
 
 // The frame of a triangle's point in its mesh's space, on the front side. MikkTSpace interpolates all three without
@@ -227,7 +235,7 @@ fn load_surface(instance: u32, triangle: u32, uv: vec2f, wo: vec3f, footprint: f
 
     surface.emission = vec3f(0.0);
     if surface.light != NONE && (surface.is_front || material.double_sided == 1u) {
-        surface.emission = emitted_radiance(triangle, uv, abs(dot(front, wo)));
+        surface.emission = emitted_radiance(triangle, uv, abs(dot(front, wo))) * emitter_power(surface.light, false);
     }
     extend_surface(&surface, shading, uvs, side);
     return surface;

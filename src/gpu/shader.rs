@@ -121,6 +121,8 @@ scene_features! {
         environment_pyramid,
         /// Any point, spot or directional light.
         punctual_lights,
+        /// Any emissive triangle that changes its power.
+        dimmed_emitters,
         /// A top level: more than one mesh that is in world space already.
         instances,
         /// Anything that moves.

@@ -41,6 +41,8 @@ pub(super) struct Motion {
     top_level: Vec<BvhNode>,
     /// What of the stage is uploaded.
     pub version: Option<u64>,
+    /// Which table of lights is uploaded.
+    light_version: Option<u64>,
     /// Whether the frame before is the same as this one on the device.
     pub at_rest: bool,
 }
@@ -97,13 +99,14 @@ impl Motion {
             before,
             top_level: Vec::new(),
             version: None,
+            light_version: None,
             at_rest: false,
         };
         (Some(motion), arrays)
     }
 
     /// Uploads the shapes of a new moment to the places that hold none of this frame's, which becomes the one before.
-    pub fn take_shapes(&mut self, gpu: &Gpu, device: &GpuScene, scene: &FlatScene, stage: &Stage) {
+    pub fn take_shapes(&mut self, gpu: &Gpu, device: &GpuScene, stage: &Stage) {
         let before = self.now;
         self.now = 1 - self.now;
         for (i, (body, places)) in stage.bodies.iter().zip(&self.places).enumerate() {
@@ -118,7 +121,6 @@ impl Motion {
                 upload(places[before], &shape.nodes, &shape.triangles, &shape.attributes);
             }
             self.before[i] = if stage.has_moved() { before } else { self.now };
-            name_lights(gpu, device, scene, body, places[self.now].1);
         }
     }
 
@@ -127,7 +129,8 @@ impl Motion {
         self.before.fill(self.now);
     }
 
-    /// Uploads instances, both top levels and the punctual lights.
+    /// Uploads instances, both top levels and the lights: the punctual ones and, where any light has changed its power, all
+    /// with their table.
     pub fn place(&mut self, gpu: &Gpu, device: &GpuScene, scene: &FlatScene, stage: &Stage) {
         let mut bodies = vec![None; scene.meshes.len()];
         for (i, body) in stage.bodies.iter().enumerate() {
@@ -169,11 +172,24 @@ impl Motion {
             self.top_level = now;
         }
 
+        if let Some((lights, version)) = stage.light_table(scene)
+            && self.light_version != Some(version)
+        {
+            write_lights(gpu, device, 0, lights);
+            self.light_version = Some(version);
+        }
+        for (body, places) in stage.bodies.iter().zip(&self.places) {
+            name_lights(gpu, device, scene, stage, body, places[self.now].1);
+        }
         let first_twin = scene.lights.len() as u32;
         let first = Stage::punctual(scene).start as u32;
         let twin = |i: usize| first_twin + i as u32;
-        let lights: Vec<Light> =
-            stage.lights.iter().enumerate().map(|(i, light)| Light { previous: twin(i), ..*light }).collect();
+        let lights: Vec<Light> = stage
+            .punctual_lights()
+            .iter()
+            .enumerate()
+            .map(|(i, light)| Light { previous: twin(i), ..*light })
+            .collect();
         let twins: Vec<Light> =
             stage.previous_lights.iter().enumerate().map(|(i, light)| Light { previous: twin(i), ..*light }).collect();
         write_lights(gpu, device, first, &lights);
@@ -182,15 +198,15 @@ impl Motion {
 }
 
 /// Emissive triangles of a body know where it lies now.
-fn name_lights(gpu: &Gpu, device: &GpuScene, scene: &FlatScene, body: &Body, first_triangle: u32) {
+fn name_lights(gpu: &Gpu, device: &GpuScene, scene: &FlatScene, stage: &Stage, body: &Body, first_triangle: u32) {
     if !body.emits() {
         return;
     }
     let Some(instance) = scene.instances.iter().find(|instance| instance.mesh == body.mesh) else { return };
     let mut lights = Vec::new();
     for (i, triangle) in body.triangles.iter().enumerate().filter(|(_, triangle)| triangle.light != NONE) {
-        if let Some(light) = scene.lights.get((instance.first_light + triangle.light) as usize) {
-            lights.push((triangle.light, Light { triangle: first_triangle + i as u32, ..*light }));
+        if let Some(light) = stage.emitter(scene, (instance.first_light + triangle.light) as usize) {
+            lights.push((triangle.light, Light { triangle: first_triangle + i as u32, ..light }));
         }
     }
     lights.sort_unstable_by_key(|&(number, _)| number);

@@ -35,6 +35,9 @@ macro_rules! gpu_struct {
     };
 }
 
+/// [`Light::intensity`] of an emissive triangle that shines as its material says, and did so in the previous frame.
+pub const FULL_POWER: Vec3 = Vec3::new(1.0, 1.0, 0.0);
+
 /// No light, no texture, no hit.
 pub const NONE: u32 = u32::MAX;
 
@@ -412,7 +415,8 @@ pub struct Light {
     pub direction: Vec3,
     /// Range in metres; 0 for unlimited.
     pub range: f32,
-    /// Candela (point, spot), lux (directional) or radiance (sun), linear Rec. 709.
+    /// Candela (point, spot), lux (directional) or radiance (sun), linear Rec. 709. Of an emissive triangle factors on its
+    /// emission: x in this frame, y in the previous one.
     pub intensity: Vec3,
     /// cos of the spot's outer angle; 1 - cos of the sun's angular radius.
     pub cos_outer: f32,

@@ -6,6 +6,7 @@
 use super::area_light::keeps_spheres;
 use super::flat::FlatScene;
 use super::flat::deformers::{Deformer, write_shape};
+use super::flat::lights;
 use super::gpu_types::{BvhNode, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, NONE, Triangle, TriangleAttributes};
 use super::rig::Pose;
 use super::rig::deform::Deformed;
@@ -27,10 +28,17 @@ pub struct Stage {
     pub transforms: Vec<Mat4>,
     /// The same in the frame before.
     pub previous_transforms: Vec<Mat4>,
-    /// The punctual lights of the flat scene.
-    pub lights: Vec<Light>,
-    /// The same in the frame before.
+    /// Lights of the flat scene, with the table that their powers make: all where any changes its power, else the punctual
+    /// ones.
+    lights: Vec<Light>,
+    /// The punctual lights in the frame before.
     pub previous_lights: Vec<Light>,
+    /// The punctual ones among `lights`.
+    punctual: Range<usize>,
+    /// Another number whenever a power or the table has changed.
+    light_version: u64,
+    /// Whether any power is another than in the frame before.
+    dimmed: bool,
     /// Meshes that change their shape, in the order of the scene's deformers.
     pub bodies: Vec<Body>,
     /// Whether anything is not where it was in the frame before.
@@ -74,7 +82,12 @@ pub struct Shape {
 impl Stage {
     /// Everything of `scene` as it is at `time` of animation `clip`; the frame before is the same.
     pub fn new(scene: &FlatScene, clip: usize, time: f64) -> Self {
-        let lights = scene.lights.get(Stage::punctual(scene)).unwrap_or_default().to_vec();
+        let punctual = Stage::punctual(scene);
+        let previous_lights = scene.lights.get(punctual.clone()).unwrap_or_default().to_vec();
+        let (lights, punctual) = match scene.light_powers.is_empty() {
+            true => (previous_lights.clone(), 0..punctual.len()),
+            false => (scene.lights.clone(), punctual),
+        };
         let transforms: Vec<Mat4> = scene.instances.iter().map(|instance| instance.transform).collect();
         let bodies = scene.deformers.list.iter().map(|deformer| Body::new(scene, deformer)).collect();
         let mut stage = Stage {
@@ -83,8 +96,11 @@ impl Stage {
             pose: Pose::default(),
             previous_transforms: transforms.clone(),
             transforms,
-            previous_lights: lights.clone(),
+            previous_lights,
             lights,
+            punctual,
+            light_version: 0,
+            dimmed: false,
             bodies,
             moved: false,
             version: 0,
@@ -118,6 +134,22 @@ impl Stage {
         first..first + scene.lights[first..].iter().take_while(is_punctual).count()
     }
 
+    /// The punctual lights as they are now.
+    pub fn punctual_lights(&self) -> &[Light] {
+        self.lights.get(self.punctual.clone()).unwrap_or_default()
+    }
+
+    /// All lights with their table, and a number that changes with them; none where no light changes its power.
+    pub fn light_table(&self, scene: &FlatScene) -> Option<(&[Light], u64)> {
+        (!scene.light_powers.is_empty()).then_some((&self.lights, self.light_version))
+    }
+
+    /// Light `index` of the scene, an emissive triangle, as it is now.
+    pub fn emitter(&self, scene: &FlatScene, index: usize) -> Option<Light> {
+        let lights = self.light_table(scene).map_or(&scene.lights[..], |(lights, _)| lights);
+        lights.get(index).copied()
+    }
+
     /// The moment, in seconds.
     pub fn time(&self) -> f64 {
         self.time
@@ -128,7 +160,7 @@ impl Stage {
         self.version
     }
 
-    /// Whether anything is not where it was in the frame before.
+    /// Whether anything is not where it was in the frame before, or not as bright.
     pub fn has_moved(&self) -> bool {
         self.moved
     }
@@ -141,7 +173,13 @@ impl Stage {
     /// Makes the frame before the same as this one.
     fn rest(&mut self) {
         self.previous_transforms.clone_from(&self.transforms);
-        self.previous_lights.clone_from(&self.lights);
+        self.previous_lights.clear();
+        self.previous_lights.extend_from_slice(self.lights.get(self.punctual.clone()).unwrap_or_default());
+        if std::mem::take(&mut self.dimmed) {
+            let emitters = self.lights.get_mut(..self.punctual.start).unwrap_or_default();
+            emitters.iter_mut().for_each(|light| light.intensity.y = light.intensity.x);
+            self.light_version += 1;
+        }
         self.bodies.iter_mut().for_each(|body| body.renumbered = None);
         self.moved = false;
     }
@@ -152,7 +190,11 @@ impl Stage {
             return;
         }
         self.version += 1;
-        self.pose = scene.rig.pose(clip, time);
+        let pose = scene.rig.pose(clip, time);
+        let powers = std::mem::replace(&mut self.pose, pose).powers;
+        if powers != self.pose.powers {
+            self.dim(scene);
+        }
         for placement in &scene.rig.instances {
             let moved = self.pose.instance(placement);
             if let Some(transform) = self.transforms.get_mut(placement.instance as usize) {
@@ -163,7 +205,8 @@ impl Stage {
             }
         }
         for attached in &scene.rig.lights {
-            if let Some(light) = self.lights.get_mut(attached.target as usize) {
+            let punctual = self.lights.get_mut(self.punctual.clone()).unwrap_or_default();
+            if let Some(light) = punctual.get_mut(attached.target as usize) {
                 let node = self.pose.node(attached.node);
                 // A light that leads out of all numbers stays where it was.
                 if !node.is_finite() {
@@ -178,6 +221,30 @@ impl Stage {
             scene.deformers.deform(scene, deformer, &self.pose, &mut vertices);
             body.shape(deformer, &vertices);
         }
+    }
+
+    /// Gives every light the power that it has in the pose, and rebuilds the table.
+    fn dim(&mut self, scene: &FlatScene) {
+        if scene.light_powers.is_empty() {
+            return;
+        }
+        // Distant lights are neither dimmed nor weighed.
+        let count = self.punctual.end;
+        let mut weights = Vec::with_capacity(count);
+        let lights = self.lights.iter_mut().take(count).enumerate();
+        for ((i, light), (full, power)) in lights.zip(scene.lights.iter().zip(&scene.light_powers)) {
+            let factor = self.pose.powers.get(*power as usize).copied().unwrap_or(1.0);
+            if i < self.punctual.start {
+                light.intensity.x = factor;
+            } else {
+                light.intensity = (full.intensity * factor).min(Vec3::splat(f32::MAX));
+            }
+            // Probabilities at full power are the weights, but for a factor that all share.
+            weights.push(f64::from(full.pmf) * f64::from(factor));
+        }
+        lights::weigh(&mut self.lights, weights);
+        self.light_version += 1;
+        self.dimmed = true;
     }
 
     /// Camera `index` of the scene where it is now.

@@ -74,7 +74,8 @@ fn weigh_pair(i: u32, j: u32, value: f32) {
     if denominator <= 0.0 {
         return;
     }
-    let share = domain_reservoirs[j].confidence_weight / select(others, confidence_sum, reuse_defensive);
+    // Not 0 / 0 where nobody else has any confidence: the canonical sample has all the weight already.
+    let share = domain_reservoirs[j].confidence_weight / max(select(others, confidence_sum, reuse_defensive), 1e-30);
     if i == 0u {
         mis_numerators[0] += share * canonical * canonical_targets[0] / denominator;
     } else {

@@ -41,11 +41,12 @@ fn empty_reservoir() -> DecoupledReservoir {
     return DecoupledReservoir(NONE, 0u, 0.0, 0u);
 }
 
-// A reservoir of the previous frame, taken to this one: of a light that has grown, the density has shrunk.
+// A reservoir of the previous frame, taken to this one: of a light that has grown, the density has shrunk; the sample of one
+// that has been switched off is dropped.
 fn history_reservoir(pixel: vec2u) -> DecoupledReservoir {
     var reservoir = reservoirs_previous[pixel_index(pixel)];
     if reservoir.light != NONE {
-        reservoir.unbiased_contribution_weight *= light_growth(reservoir.light);
+        reservoir.unbiased_contribution_weight *= history_factor(reservoir.light);
     }
     return reservoir;
 }

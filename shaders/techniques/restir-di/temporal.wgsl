@@ -2,7 +2,7 @@
 // One invocation: one pixel. Reads both visibility buffers, this frame's initial reservoirs and the previous frame's
 // final ones. Writes the combined reservoirs.
 // What the previous frame's pixel saw is rebuilt and its shadow rays are traced in the scene as it was then: transforms,
-// shapes, lights and BVH of one frame are kept. So reuse stays unbiased whatever moves.
+// shapes, lights with their power, and BVH of one frame are kept. So reuse stays unbiased whatever moves or is switched.
 // Source: Bitterli et al. 2020, Algorithm 5, lines 8 to 12; thesis 001, section 5.3.1 (rejection by position, normal and
 // albedo); history cap of Bitterli et al. 2020, section 4.2.
 #include "scene/counters.wgsl"
@@ -46,7 +46,7 @@ fn combine_slot(pixel: vec2u, previous_pixel: vec2u, slot: u32, surface: Surface
     let current = load_reservoir(pixel, slot);
     var history = load_previous_reservoir(previous_pixel, slot);
     if history.light != NONE {
-        history.unbiased_contribution_weight *= light_growth(history.light);
+        history.unbiased_contribution_weight *= history_factor(history.light);
     }
     history.confidence_weight = min(history.confidence_weight, params.history_cap * current.confidence_weight);
     combination_begin();

@@ -21,7 +21,7 @@ fn keep(pixel: vec2u) {
 fn load_history(pixel: vec2u, strategy: u32, own_count: f32) -> ReportReservoir {
     var history = reservoirs_previous[reservoir_index(pixel, strategy)];
     if history.light != NONE {
-        let growth = light_growth(history.light);
+        let growth = history_factor(history.light);
         history.unbiased_contribution_weight *= growth;
         history.desired_pdf = select(0.0, history.desired_pdf / growth, growth > 0.0);
     }

@@ -3,6 +3,7 @@
 use crate::failure::Result;
 use crate::{report, scene};
 use restir::scene::flat::{SceneStats, TextureStats};
+use restir::scene::gpu_types::NONE;
 
 /// Show what a scene holds: triangles, lights, bytes, the BVH, warnings.
 #[derive(clap::Args)]
@@ -27,6 +28,8 @@ struct Info {
     scenes: Vec<String>,
     variants: Vec<String>,
     moving_lights: usize,
+    /// Lights that change their power.
+    dimmed_lights: usize,
     moving_instances: usize,
     moving_cameras: usize,
     animations: Vec<Animation>,
@@ -62,6 +65,7 @@ pub fn run(args: &Args) -> Result<()> {
         scenes: contents.scenes,
         variants: contents.variants,
         moving_lights: flat.rig.lights.len(),
+        dimmed_lights: flat.light_powers.iter().filter(|&&power| power != NONE).count(),
         moving_instances: flat.rig.instances.len(),
         moving_cameras: flat.rig.cameras.len(),
         animations: flat.rig.clips.iter().map(Animation::of).collect(),
@@ -86,8 +90,8 @@ fn table(info: &Info) -> String {
         format!("textures   {}", stats.textures),
         format!("lights     {} ({} emissive triangles)", stats.lights, stats.emissive_triangles),
         format!(
-            "moving     {} instances, {} lights, {} cameras",
-            info.moving_instances, info.moving_lights, info.moving_cameras
+            "moving     {} instances, {} lights, {} cameras; {} lights change their power",
+            info.moving_instances, info.moving_lights, info.moving_cameras, info.dimmed_lights
         ),
         format!("animations {}", info.animations.iter().map(Animation::line).collect::<Vec<_>>().join(", ")),
         format!("cameras    {}", info.cameras.join(", ")),

@@ -10,6 +10,7 @@ mod hall;
 mod many_lights;
 mod materials;
 mod motion;
+mod switching;
 mod torches;
 mod veach_mis;
 
@@ -118,6 +119,12 @@ pub const ALL: &[BuiltinInfo] = &[
         doc: "A column bent by its skin, a ball that morphs, a box, a lamp, a light and a camera that move, in a loop of 4 seconds.",
         example: "motion",
     },
+    BuiltinInfo {
+        name: "switching",
+        title: "Lamps that go on and off",
+        doc: "A room with 36 coloured lamps (meshes, spheres and points) round its walls that are switched on and off or fade in turn, in a loop of 6 seconds.",
+        example: "switching",
+    },
 ];
 
 /// Makes a built-in scene; the same name gives the same scene.
@@ -142,6 +149,7 @@ pub fn make(name: &str) -> Result<Scene> {
         "glossy-spheres" => Ok(glossy_spheres::glossy_spheres()),
         "materials" => Ok(materials::materials()),
         "motion" => Ok(motion::motion()),
+        "switching" => Ok(switching::switching()),
         _ => match ALL.iter().find(|scene| scene.name == name) {
             Some(scene) => {
                 Err(Error::bad_value(scene.form(), format!("its number is missing, as in {}", scene.example)))

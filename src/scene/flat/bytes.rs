@@ -18,7 +18,7 @@ const _: () = assert!(cfg!(target_endian = "little"), "arrays are copied as they
 
 const MAGIC: [u8; 4] = *b"RSTR";
 /// Of the layout: to be raised by each change to the header, the arrays or their elements.
-pub(super) const VERSION: u32 = 5;
+pub(super) const VERSION: u32 = 6;
 const PREFIX: usize = 16;
 const ALIGNMENT: usize = 16;
 
@@ -48,6 +48,7 @@ struct Sections {
     materials: usize,
     material_extensions: usize,
     lights: usize,
+    light_powers: usize,
     environment_texels: usize,
     deformers: usize,
     deformer_vertices: usize,
@@ -104,6 +105,7 @@ impl FlatScene {
             bytemuck::cast_slice(&self.materials),
             bytemuck::cast_slice(&self.material_extensions),
             bytemuck::cast_slice(&self.lights),
+            bytemuck::cast_slice(&self.light_powers),
         ];
         sections.extend(self.textures.iter().map(|array| &array.texels[..]));
         if let Some(environment) = &self.environment {
@@ -130,6 +132,7 @@ impl FlatScene {
             &mut self.materials,
             &mut self.material_extensions,
             &mut self.lights,
+            &mut self.light_powers,
         ];
         sections.extend(self.textures.iter_mut().map(|array| &mut array.texels as &mut dyn Section));
         if let Some(environment) = &mut self.environment {
@@ -209,6 +212,7 @@ impl FlatScene {
             materials,
             material_extensions,
             lights,
+            light_powers,
             environment_texels,
             deformers,
             deformer_vertices,
@@ -225,6 +229,7 @@ impl FlatScene {
             materials: reader.array(materials, "materials")?,
             material_extensions: reader.array(material_extensions, "material extensions")?,
             lights: reader.array(lights, "lights")?,
+            light_powers: reader.array(light_powers, "light_powers")?,
             first_punctual: header.first_punctual,
             textures: header.textures.into_iter().map(|array| array.read(&mut reader)).collect::<Result<_>>()?,
             environment: match header.environment {
@@ -337,6 +342,7 @@ fn header_of(scene: &FlatScene) -> Header {
             materials: scene.materials.len(),
             material_extensions: scene.material_extensions.len(),
             lights: scene.lights.len(),
+            light_powers: scene.light_powers.len(),
             environment_texels: scene.environment.as_ref().map_or(0, |e| e.radiance.len()),
             deformers: scene.deformers.list.len(),
             deformer_vertices: scene.deformers.vertices.len(),

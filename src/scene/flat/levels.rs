@@ -28,6 +28,9 @@ pub(super) struct Levels {
     pub deformers: Deformers,
     /// The scene's rig, with instances of this scene.
     pub rig: Rig,
+    /// Of the merged mesh: the number of the first triangle, in the order of the scene, of each instance merged, and that
+    /// instance; empty where nobody asks (no light changes its power).
+    pub merged: Vec<(u32, u32)>,
     /// Triangles left out.
     pub dropped: u64,
     /// Longest path through both levels, in nodes.
@@ -121,6 +124,7 @@ pub(super) fn build(scene: &Scene, progress: &mut dyn FnMut(f32, &str)) -> Resul
         instances: Vec::new(),
         deformers: Deformers::default(),
         rig: scene.rig.clone(),
+        merged: Vec::new(),
         dropped: 0,
         depth: 0,
     };
@@ -134,6 +138,9 @@ pub(super) fn build(scene: &Scene, progress: &mut dyn FnMut(f32, &str)) -> Resul
                 // Each report may cross a thread.
                 if k.is_multiple_of(parts.div_ceil(MAX_REPORTS)) {
                     report(0.3 * k as f32 / parts as f32, "placing meshes");
+                }
+                if !scene.rig.powers.is_empty() {
+                    levels.merged.push((soup.triangles.len() as u32, index));
                 }
                 let instance = &scene.instances[index as usize];
                 soup.add(scene, &scene.meshes[instance.mesh as usize], instance.transform);

@@ -4,8 +4,8 @@ use super::emission::Emission;
 use super::{FlatInstance, FlatMesh};
 use crate::error::{Error, Result};
 use crate::scene::gpu_types::{
-    LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, LIGHT_SUN, LIGHT_TRIANGLE, Light, NONE, Triangle,
-    TriangleAttributes,
+    FULL_POWER, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, LIGHT_SUN, LIGHT_TRIANGLE, Light, NONE,
+    Triangle, TriangleAttributes,
 };
 use crate::scene::{PunctualKind, PunctualLight, Shape, Sun, alias};
 use glam::{DVec3, Vec3};
@@ -20,8 +20,14 @@ pub(super) fn luminance(color: Vec3) -> f64 {
     color.as_dvec3().dot(DVec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// Emissive triangles with what each weighs in the table.
-pub(super) type Emitters = Vec<(Light, f64)>;
+/// An emissive triangle of an instance.
+pub(super) struct Emitter {
+    pub light: Light,
+    /// What it weighs in the table.
+    pub weight: f64,
+    /// Its number among the triangles of its mesh, in the order of the scene.
+    pub place: u32,
+}
 
 /// The emissive triangles of all instances, instance after instance; each triangle learns which of its instance's lights
 /// it is, each instance where its lights begin.
@@ -33,10 +39,10 @@ pub(super) fn emitters(
     instances: &mut [FlatInstance],
     attributes: &[TriangleAttributes],
     emission: &Emission,
-) -> Emitters {
-    // Index and mean emission of the emissive triangles of each mesh, by number: in the order of the scene, which their
+) -> Vec<Emitter> {
+    // Place, index and mean emission of the emissive triangles of each mesh, by place: the order of the scene, which their
     // `light` holds so far, whatever that of the tree.
-    let mut emitted: Vec<Vec<(u32, f64)>> = Vec::with_capacity(meshes.len());
+    let mut emitted: Vec<Vec<(u32, u32, f64)>> = Vec::with_capacity(meshes.len());
     for mesh in meshes {
         let mut of_mesh = Vec::new();
         for i in mesh.first_triangle..mesh.first_triangle + mesh.triangles {
@@ -51,20 +57,20 @@ pub(super) fn emitters(
             }
         }
         of_mesh.sort_unstable_by_key(|&(place, ..)| place);
-        emitted.push(of_mesh.into_iter().map(|(_, i, mean)| (i, mean)).collect());
-        for (&(i, _), number) in emitted.last().into_iter().flatten().zip(0..) {
+        emitted.push(of_mesh);
+        for (&(_, i, _), number) in emitted.last().into_iter().flatten().zip(0..) {
             triangles[i as usize].light = number;
         }
     }
-    let mut emitters = Emitters::new();
+    let mut emitters = Vec::new();
     for (index, instance) in instances.iter_mut().enumerate() {
         instance.first_light = emitters.len() as u32;
-        for &(i, mean) in &emitted[instance.mesh as usize] {
+        for &(place, i, mean) in &emitted[instance.mesh as usize] {
             let triangle = &triangles[i as usize];
             let [p0, p1, p2] = [triangle.p0, triangle.p1, triangle.p2].map(|p| instance.transform.transform_point3(p));
             let area = area_factor(triangle.shape()) * (p1 - p0).as_dvec3().cross((p2 - p0).as_dvec3()).length();
-            let light = Light { triangle: i, instance: index as u32, ..empty(LIGHT_TRIANGLE) };
-            emitters.push((light, mean * area));
+            let light = Light { triangle: i, instance: index as u32, intensity: FULL_POWER, ..empty(LIGHT_TRIANGLE) };
+            emitters.push(Emitter { light, weight: mean * area, place });
         }
     }
     emitters
@@ -72,11 +78,11 @@ pub(super) fn emitters(
 
 /// What moves may gain area after time 0, or come near: each of its triangles is drawn at least a thousandth as often as all
 /// are on average. A light of probability 0 would be missing from every estimate that draws lights.
-pub(super) fn keep_movers(emitters: &mut Emitters, moves: impl Fn(u32) -> bool) {
-    let total: f64 = emitters.iter().map(|(_, weight)| weight).sum();
+pub(super) fn keep_movers(emitters: &mut [Emitter], moves: impl Fn(u32) -> bool) {
+    let total: f64 = emitters.iter().map(|emitter| emitter.weight).sum();
     let least = if total > 0.0 { 1e-3 * total / emitters.len() as f64 } else { 1.0 };
-    for (_, weight) in emitters.iter_mut().filter(|(light, _)| moves(light.instance)) {
-        *weight = weight.max(least);
+    for emitter in emitters.iter_mut().filter(|emitter| moves(emitter.light.instance)) {
+        emitter.weight = emitter.weight.max(least);
     }
 }
 
@@ -96,12 +102,13 @@ fn area_factor(shape: Shape) -> f64 {
 /// A punctual light weighs the luminance of its intensity, sun and environment together as much as all the others, each
 /// the same.
 pub(super) fn build(
-    emitters: Emitters,
+    emitters: Vec<Emitter>,
     punctual: &[PunctualLight],
     sun: Option<&Sun>,
     has_environment: bool,
 ) -> Result<(Vec<Light>, u32)> {
-    let (mut lights, mut weights): (Vec<Light>, Vec<f64>) = emitters.into_iter().unzip();
+    let (mut lights, mut weights): (Vec<Light>, Vec<f64>) =
+        emitters.into_iter().map(|emitter| (emitter.light, emitter.weight)).unzip();
     let first_punctual = lights.len() as u32;
     for (i, light) in punctual.iter().enumerate() {
         let sound = light.position.is_finite() && light.direction.is_finite() && !light.range.is_nan();
@@ -112,18 +119,24 @@ pub(super) fn build(
         weights.push(luminance(light.intensity));
     }
     let sun = sun.map(flatten_sun).transpose()?.flatten();
-    let distant: Vec<Light> = sun.into_iter().chain(has_environment.then(|| empty(LIGHT_ENVIRONMENT))).collect();
+    lights.extend(sun.into_iter().chain(has_environment.then(|| empty(LIGHT_ENVIRONMENT))));
+    weigh(&mut lights, weights);
+    Ok((lights, first_punctual))
+}
+
+/// Fills in the alias table and the cumulative distribution of all lights. `weights` are those of the first lights; the
+/// distant ones, which are the last, have none and share as much as all the others together.
+pub(crate) fn weigh(lights: &mut [Light], mut weights: Vec<f64>) {
+    let distant = lights.len().saturating_sub(weights.len());
     let others: f64 = weights.iter().sum();
-    let weight = if others > 0.0 { others / distant.len() as f64 } else { 1.0 };
-    weights.extend(distant.iter().map(|_| weight));
-    lights.extend(distant);
+    let weight = if others > 0.0 { others / distant as f64 } else { 1.0 };
+    weights.extend(std::iter::repeat_n(weight, distant));
     for (light, entry) in lights.iter_mut().zip(alias::build(&weights)) {
         light.pmf = entry.pmf;
         light.alias_threshold = entry.threshold;
         light.alias_light = entry.alias;
     }
-    accumulate(&mut lights);
-    Ok((lights, first_punctual))
+    accumulate(lights);
 }
 
 /// Fills in the cumulative distribution, in whole parts of 2^32. Whatever can be drawn has a part at least, so that the

@@ -8,7 +8,7 @@ pub(crate) mod environment;
 mod extensions;
 mod framing;
 pub(crate) mod levels;
-mod lights;
+pub(super) mod lights;
 mod materials;
 mod mips;
 mod packing;
@@ -24,7 +24,7 @@ use super::gpu_types::{BvhNode, Light, Material, MaterialExtensions, NONE, Trian
 use super::{Camera, MAX_COORDINATE, Projection, PunctualKind, Rig, Scene, bvh, rig};
 use crate::error::{Error, Result};
 use glam::{Mat4, Vec3};
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 /// Images of about one size, each with its mip chain, in layers of one size. Texels are as stored in the files (sRGB where
 /// the file says so).
@@ -165,6 +165,9 @@ pub struct FlatScene {
     pub material_extensions: Vec<MaterialExtensions>,
     /// With alias table; the sun and the environment, if any, are the last. May be empty.
     pub lights: Vec<Light>,
+    /// For each light the factor on its power, an index in [`Rig::powers`], or `NONE`; empty where no light changes its
+    /// power. `lights` and their table are those of full power, all factors 1.
+    pub light_powers: Vec<u32>,
     /// Index in `lights` of the first punctual light; they follow in the order of [`Scene::lights`].
     pub first_punctual: u32,
     /// What moves; its instances and cameras are those of this scene, its lights count from `first_punctual`.
@@ -194,8 +197,18 @@ impl FlatScene {
     pub fn build(scene: &Scene, progress: &mut dyn FnMut(f32, &str)) -> Result<Self> {
         let mut warnings = scene.warnings.clone();
         let geometry = levels::build(scene, &mut |fraction, what| progress(0.8 * fraction, what))?;
-        let levels::Levels { nodes, mut triangles, attributes, meshes, mut instances, deformers, rig, dropped, depth } =
-            geometry;
+        let levels::Levels {
+            nodes,
+            mut triangles,
+            attributes,
+            meshes,
+            mut instances,
+            deformers,
+            mut rig,
+            merged,
+            dropped,
+            depth,
+        } = geometry;
         if dropped > 0 {
             warnings.push(format!("{dropped} triangles without area or with unusable positions were left out"));
         }
@@ -220,9 +233,16 @@ impl FlatScene {
         let mut emitters = lights::emitters(&mut triangles, &meshes, &mut instances, &attributes, &emission);
         let movers: HashSet<u32> = scene.rig.instances.iter().map(|placement| placement.instance).collect();
         lights::keep_movers(&mut emitters, |instance| movers.contains(&instances[instance as usize].source));
+        let powers = light_powers(&mut rig, &emitters, &instances, &merged);
         let (lights, first_punctual) =
             lights::build(emitters, &scene.lights, scene.sun.as_ref(), environment.is_some())?;
 
+        // Distant lights are never dimmed, and the last.
+        let light_powers = if rig.powers.is_empty() {
+            Vec::new()
+        } else {
+            powers.into_iter().chain(std::iter::repeat(NONE)).take(lights.len()).collect()
+        };
         let bounds = bounds(&instances, &meshes, &nodes, scene);
         let mut flat = FlatScene {
             name: scene.name.clone(),
@@ -237,6 +257,7 @@ impl FlatScene {
             materials,
             material_extensions,
             lights,
+            light_powers,
             first_punctual,
             rig,
             deformers,
@@ -301,6 +322,35 @@ impl FlatScene {
         let textures: usize = self.textures.iter().map(|array| array.texels.len()).sum();
         (arrays + textures + environment) as u64
     }
+}
+
+/// The factor on the power of each emissive triangle, then of each punctual light, as the rig's dimmers say, which are taken
+/// away. `merged` is that of [`levels::Levels`].
+fn light_powers(
+    rig: &mut Rig,
+    emitters: &[lights::Emitter],
+    instances: &[FlatInstance],
+    merged: &[(u32, u32)],
+) -> Vec<u32> {
+    let by_target = |dimmers: Vec<rig::Dimmer>| -> HashMap<u32, u32> {
+        dimmers.into_iter().map(|dimmer| (dimmer.target, dimmer.power)).collect()
+    };
+    let of_instance = by_target(std::mem::take(&mut rig.dimmed_instances));
+    let of_light = by_target(std::mem::take(&mut rig.dimmed_lights));
+    let source = |emitter: &lights::Emitter| match instances[emitter.light.instance as usize].source {
+        NONE => {
+            let after = merged.partition_point(|(first, _)| *first <= emitter.place);
+            merged.get(after.wrapping_sub(1)).map_or(NONE, |(_, instance)| *instance)
+        }
+        source => source,
+    };
+    let power = |powers: &HashMap<u32, u32>, target: u32| powers.get(&target).copied().unwrap_or(NONE);
+    let last = of_light.keys().max().map_or(0, |last| last + 1);
+    emitters
+        .iter()
+        .map(|emitter| power(&of_instance, source(emitter)))
+        .chain((0..last).map(|light| power(&of_light, light)))
+        .collect()
 }
 
 fn has_top(meshes: &[FlatMesh]) -> bool {

@@ -26,6 +26,14 @@ pub(super) fn validate(scene: &FlatScene) -> Result<(), Fault> {
     must(complete, "not one a material").map_err(|what| fault("material extensions", what))?;
     each("material extensions", extensions, |_, extensions| check_extensions(&scene.textures, extensions))?;
     each("lights", &scene.lights, |i, light| check_light(scene, i, light))?;
+    let complete = scene.light_powers.is_empty() || scene.light_powers.len() == scene.lights.len();
+    must(complete, "not one a light").map_err(|what| fault("light_powers", what))?;
+    each("light_powers", &scene.light_powers, |i, &power| {
+        let can_be_dimmed = scene.lights.get(i).is_some_and(|light| light.kind < LIGHT_ENVIRONMENT);
+        must(power == NONE || (can_be_dimmed && (power as usize) < scene.rig.powers.len()), "no such power")
+    })?;
+    let complete = scene.rig.powers.is_empty() || !scene.light_powers.is_empty() || scene.lights.is_empty();
+    must(complete, "missing").map_err(|what| fault("light_powers", what))?;
     emitters(scene)?;
     let punctual = (scene.lights.len() as u64).checked_sub(u64::from(scene.first_punctual));
     let punctual = punctual.ok_or_else(|| fault("first_punctual", "past the lights"))?;

@@ -4,6 +4,7 @@ use super::accessor::{self, Elements};
 use super::buffers::Buffers;
 use super::container::Document;
 use super::mesh::Budget;
+use super::pointers::PowerChannel;
 use super::tidy;
 use crate::error::Result;
 use crate::scene::rig::{CUBIC_SPLINE, LINEAR, ROTATION, Rig, SCALE, STEP, TRANSLATION, WEIGHTS};
@@ -19,15 +20,17 @@ pub(super) struct Targets<'a> {
     pub weights: &'a [u32],
 }
 
-/// Loads every animation into `rig`, in file order. Channels whose node is not in the scene move nothing.
+/// Loads every animation into `rig`, in file order, each with its `powers`. Channels whose node is not in the scene move nothing.
 pub(super) fn load(
     document: &Document,
     buffers: &Buffers,
     budget: &mut Budget,
     targets: &Targets,
+    powers: &[PowerChannel],
     rig: &mut Rig,
     warnings: &mut Vec<String>,
 ) -> Result<()> {
+    let mut powers = powers.iter().peekable();
     for (index, animation) in document.root.animations.iter().enumerate() {
         let place = format!("animations[{index}]");
         rig.add_clip(animation.name.as_deref().map_or_else(|| place.clone(), tidy));
@@ -58,10 +61,9 @@ pub(super) fn load(
                 rig.add_channel(node, path, keyframes.interpolation, &keyframes.times, &keyframes.values);
             }
         }
-    }
-    if document.pointer_channels > 0 {
-        let count = document.pointer_channels;
-        warnings.push(format!("{count} channel(s) of animations target no node (KHR_animation_pointer): not played"));
+        while let Some(PowerChannel { power, keyframes, .. }) = powers.next_if(|next| next.animation == index) {
+            rig.add_power_channel(*power, keyframes.interpolation, &keyframes.times, &keyframes.values);
+        }
     }
     Ok(())
 }
@@ -76,22 +78,22 @@ fn path(property: Property) -> u32 {
 }
 
 /// A sampler's contents.
-struct Keyframes {
-    interpolation: u32,
-    times: Vec<f32>,
-    values: Vec<f32>,
+pub(super) struct Keyframes {
+    pub interpolation: u32,
+    pub times: Vec<f32>,
+    pub values: Vec<f32>,
 }
 
-struct Reader<'a> {
-    document: &'a Document<'a>,
-    buffers: &'a Buffers<'a>,
-    sampler: &'a Sampler,
-    place: String,
+pub(super) struct Reader<'a> {
+    pub document: &'a Document<'a>,
+    pub buffers: &'a Buffers<'a>,
+    pub sampler: &'a Sampler,
+    pub place: String,
 }
 
 impl Reader<'_> {
     /// Times and values, checked; `weights` is the number of weights in a keyframe of those.
-    fn read(&self, budget: &mut Budget, property: Property, weights: u32) -> Result<Keyframes> {
+    pub fn read(&self, budget: &mut Budget, property: Property, weights: u32) -> Result<Keyframes> {
         let interpolation =
             self.document.valid(&self.sampler.interpolation, &format!("{}.interpolation", self.place))?;
         let (interpolation, per_key) = match interpolation {

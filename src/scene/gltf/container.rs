@@ -29,8 +29,20 @@ pub(super) struct Document<'a> {
     pub decoders: Option<&'a dyn Decoders>,
     /// Whether the file names one of [`DECODED_EXTENSIONS`].
     pub uses_decoded_extensions: bool,
-    /// Channels of animations that target no node (KHR_animation_pointer), and were left out.
-    pub pointer_channels: usize,
+    /// Channels of animations that target no node, and were taken out of `root`.
+    pub pointers: Vec<Pointer>,
+}
+
+/// A channel that targets a property by its JSON pointer (KHR_animation_pointer), not a node.
+pub(super) struct Pointer {
+    /// Index of the animation.
+    pub animation: usize,
+    /// Where the channel stands in the file.
+    pub place: String,
+    /// Index of the sampler.
+    pub sampler: Option<usize>,
+    /// The pointer; empty where there is none.
+    pub path: String,
 }
 
 impl Document<'_> {
@@ -105,9 +117,8 @@ pub(super) fn parse<'a>(file: &'a str, bytes: &'a [u8], options: &Options<'a>) -
         contents.variants.iter().position(|known| known == name).ok_or_else(unknown)
     });
     let variant = variant.transpose()?;
-    let pointer_channels =
-        header.animations.iter().flat_map(|animation| &animation.channels).filter(|c| c.is_pointer()).count();
-    let root = if pointer_channels == 0 && header.scenes.iter().all(|scene| scene.nodes.is_some()) {
+    let pointers = header.pointers();
+    let root = if pointers.is_empty() && header.scenes.iter().all(|scene| scene.nodes.is_some()) {
         serde_json::from_slice(json).map_err(|error| json_error(file, &error))?
     } else {
         // By way of text: a second deserializer, of values, would add a tenth to what the page downloads.
@@ -118,7 +129,7 @@ pub(super) fn parse<'a>(file: &'a str, bytes: &'a [u8], options: &Options<'a>) -
     };
     let Options { scene, decoders, .. } = *options;
     let uses_decoded_extensions = header.uses_decoded_extensions();
-    Ok(Document { file, root, binary, contents, scene, variant, decoders, uses_decoded_extensions, pointer_channels })
+    Ok(Document { file, root, binary, contents, scene, variant, decoders, uses_decoded_extensions, pointers })
 }
 
 /// Gives each scene its `nodes`, which the specification lets it leave out, but the JSON crate does not; and takes away
@@ -235,6 +246,7 @@ struct AnimationHeader {
 /// One of `channels` of [`AnimationHeader`].
 #[derive(serde::Deserialize)]
 struct ChannelHeader {
+    sampler: Option<usize>,
     target: TargetHeader,
 }
 
@@ -242,13 +254,22 @@ struct ChannelHeader {
 #[derive(serde::Deserialize)]
 struct TargetHeader {
     node: Option<serde::de::IgnoredAny>,
+    #[serde(default)]
+    extensions: TargetExtensions,
 }
 
-impl ChannelHeader {
-    /// Whether it targets no node.
-    fn is_pointer(&self) -> bool {
-        self.target.node.is_none()
-    }
+/// `extensions` of [`TargetHeader`].
+#[derive(Default, serde::Deserialize)]
+struct TargetExtensions {
+    #[serde(default, rename = "KHR_animation_pointer")]
+    pointer: PointerHeader,
+}
+
+/// KHR_animation_pointer of [`TargetExtensions`].
+#[derive(Default, serde::Deserialize)]
+struct PointerHeader {
+    #[serde(default)]
+    pointer: String,
 }
 
 /// One of `scenes` of [`Header`].
@@ -290,6 +311,21 @@ impl Header {
             variants: self.extensions.variants.variants.iter().map(|variant| tidy(&variant.name)).collect(),
             needs_decoders: !self.images.is_empty() || self.uses_decoded_extensions(),
         }
+    }
+
+    /// The channels that target no node.
+    fn pointers(&self) -> Vec<Pointer> {
+        let mut pointers = Vec::new();
+        for (animation, AnimationHeader { channels }) in self.animations.iter().enumerate() {
+            let others = channels.iter().enumerate().filter(|(_, channel)| channel.target.node.is_none());
+            pointers.extend(others.map(|(position, channel)| Pointer {
+                animation,
+                place: format!("animations[{animation}].channels[{position}]"),
+                sampler: channel.sampler,
+                path: channel.target.extensions.pointer.pointer.clone(),
+            }));
+        }
+        pointers
     }
 
     fn uses_decoded_extensions(&self) -> bool {

@@ -23,6 +23,7 @@ mod material;
 mod material_extensions;
 mod mesh;
 mod nodes;
+mod pointers;
 mod skins;
 mod topology;
 mod uri;
@@ -43,6 +44,7 @@ pub const SUPPORTED_EXTENSIONS: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
+    "KHR_animation_pointer",
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",

@@ -4,7 +4,7 @@ use super::buffers::Buffers;
 use super::container::Document;
 use super::material::UvSets;
 use super::mesh::{self, Budget};
-use super::{MAX_INSTANCES, animations, area_lights, camera, instancing, lights, skins};
+use super::{MAX_INSTANCES, animations, area_lights, camera, instancing, lights, pointers, skins};
 use crate::error::Result;
 use crate::scene::gpu_types::NONE;
 use crate::scene::rig::{Attachment, Node as RigNode, Placement};
@@ -24,6 +24,7 @@ pub(super) fn load(document: &Document, buffers: &Buffers, uv_sets: &[UvSets], s
         budget: Budget::default(),
         meshes: vec![None; document.root.meshes.len()],
         triangles: 0,
+        light_sources: Vec::new(),
         cameras: Vec::new(),
         rig_nodes: vec![None; document.root.nodes.len()],
         is_rigged: is_rigged(document),
@@ -111,6 +112,8 @@ struct Loader<'a> {
     meshes: Vec<Option<Vec<u32>>>,
     /// Triangles of all instances.
     triangles: u64,
+    /// For each light of the scene, its index in the file.
+    light_sources: Vec<usize>,
     /// Cameras with their index in the file and their node in the rig.
     cameras: Vec<(usize, Camera, u32)>,
     /// For each node of the file, its index in the rig, once it has been walked.
@@ -149,10 +152,11 @@ impl Loader<'_> {
         let light = node.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref());
         if let Some(light) = light {
             match lights::load(self.document, light.light.value(), &to_world, &place)? {
-                Some(light) => {
+                Some(loaded) => {
                     let target = self.scene.lights.len() as u32;
                     self.scene.rig.lights.push(Attachment { target, node: rig_node });
-                    self.scene.lights.push(light);
+                    self.scene.lights.push(loaded);
+                    self.light_sources.push(light.light.value());
                 }
                 None => self.scene.warnings.push(format!("{place}: its light is left out: its scale is zero")),
             }
@@ -223,7 +227,7 @@ impl Loader<'_> {
 
     /// Loads the skins that are in use and the animations, and settles what they do not move.
     fn rig(self) -> Result<()> {
-        let Loader { document, buffers, scene, mut budget, rig_nodes, .. } = self;
+        let Loader { document, buffers, scene, mut budget, rig_nodes, light_sources, .. } = self;
         let mut skins = vec![None; document.root.skins.len()];
         for i in 0..scene.rig.instances.len() {
             let (file_skin, instance) = (scene.rig.instances[i].skin, scene.rig.instances[i].instance);
@@ -254,7 +258,9 @@ impl Loader<'_> {
             *count = node.mesh.map_or(0, |mesh| target_count(document, mesh.value()));
         }
         let targets = animations::Targets { nodes: &rig_nodes, weights: &weights };
-        animations::load(document, buffers, &mut budget, &targets, &mut scene.rig, &mut scene.warnings)?;
+        let powers = pointers::load(document, buffers, &mut budget, &light_sources, scene)?;
+        let (rig, warnings) = (&mut scene.rig, &mut scene.warnings);
+        animations::load(document, buffers, &mut budget, &targets, &powers, rig, warnings)?;
         scene.settle();
         Ok(())
     }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(in crate::scene) struct Header {
     clips: Vec<Clip>,
-    lengths: [usize; 10],
+    lengths: [usize; 11],
 }
 
 /// Takes the next array of this many elements.
@@ -49,12 +49,13 @@ impl Rig {
                 self.instances.len(),
                 self.lights.len(),
                 self.cameras.len(),
+                self.powers.len(),
             ],
         }
     }
 
-    /// The arrays, in the order of the header's lengths.
-    pub(in crate::scene) fn arrays(&self) -> [&[u8]; 10] {
+    /// The arrays, in the order of the header's lengths; a flat scene's rig dims nothing by itself.
+    pub(in crate::scene) fn arrays(&self) -> [&[u8]; 11] {
         use bytemuck::cast_slice;
         [
             cast_slice(&self.nodes),
@@ -67,11 +68,12 @@ impl Rig {
             cast_slice(&self.instances),
             cast_slice(&self.lights),
             cast_slice(&self.cameras),
+            cast_slice(&self.powers),
         ]
     }
 
     /// The same, to be filled.
-    pub(in crate::scene) fn arrays_mut(&mut self) -> [&mut dyn Section; 10] {
+    pub(in crate::scene) fn arrays_mut(&mut self) -> [&mut dyn Section; 11] {
         [
             &mut self.nodes,
             &mut self.channels,
@@ -83,12 +85,13 @@ impl Rig {
             &mut self.instances,
             &mut self.lights,
             &mut self.cameras,
+            &mut self.powers,
         ]
     }
 
     /// The rig again; not checked yet.
     pub(in crate::scene) fn from_arrays(header: Header, reader: &mut impl TakeArray) -> Result<Rig> {
-        let [nodes, channels, keys, spins, skins, joints, weights, instances, lights, cameras] = header.lengths;
+        let [nodes, channels, keys, spins, skins, joints, weights, instances, lights, cameras, powers] = header.lengths;
         Ok(Rig {
             clips: header.clips,
             nodes: reader.take_array(nodes, "rig.nodes")?,
@@ -101,6 +104,9 @@ impl Rig {
             instances: reader.take_array(instances, "rig.instances")?,
             lights: reader.take_array(lights, "rig.lights")?,
             cameras: reader.take_array(cameras, "rig.cameras")?,
+            powers: reader.take_array(powers, "rig.powers")?,
+            dimmed_instances: Vec::new(),
+            dimmed_lights: Vec::new(),
         })
     }
 }

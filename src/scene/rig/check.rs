@@ -1,6 +1,6 @@
 //! Whether a rig is sound: what evaluates it trusts its indices.
 
-use super::{CUBIC_SPLINE, Channel, Clip, NONE, ROTATION, Rig, WEIGHTS};
+use super::{CUBIC_SPLINE, Channel, Clip, NONE, POWER, ROTATION, Rig, WEIGHTS};
 
 /// (where, what is wrong there).
 type Fault = (String, String);
@@ -30,6 +30,17 @@ impl Rig {
         must(self.keys.iter().all(|key| key.is_finite()), "not finite").map_err(|what| fault("rig.keys", what))?;
         must(self.weights.iter().all(|weight| weight.is_finite()), "not finite")
             .map_err(|what| fault("rig.weights", what))?;
+        let is_power = |power: &f32| power.is_finite() && *power >= 0.0;
+        must(self.powers.iter().all(is_power), "negative, or not finite").map_err(|what| fault("rig.powers", what))?;
+        for (name, dimmers, count) in [
+            ("rig.dimmed_instances", &self.dimmed_instances, counts.instances),
+            ("rig.dimmed_lights", &self.dimmed_lights, counts.lights),
+        ] {
+            each(name, dimmers, |_, dimmer| {
+                must((dimmer.target as usize) < count, "there is nothing of that index")?;
+                must((dimmer.power as usize) < self.powers.len(), "no such power")
+            })?;
+        }
         each("rig.clips", &self.clips, |_, clip| self.check_clip(clip))?;
         each("rig.channels", &self.channels, |_, channel| self.check_channel(channel))?;
         let is_node = |node: u32| must((node as usize) < self.nodes.len(), "no such node");
@@ -69,18 +80,25 @@ impl Rig {
 
     fn check_channel(&self, channel: &Channel) -> Result<(), &'static str> {
         let Channel { node, path, interpolation, count, width, first_time, first_value, first_weight } = *channel;
-        must((node as usize) < self.nodes.len(), "no such node")?;
-        must(path <= WEIGHTS && interpolation <= CUBIC_SPLINE, "an unknown path or interpolation")?;
+        must(path == POWER || (node as usize) < self.nodes.len(), "no such node")?;
+        must(path <= POWER && interpolation <= CUBIC_SPLINE, "an unknown path or interpolation")?;
         let fits = match path {
             WEIGHTS => within(first_weight, width, self.weights.len()),
             ROTATION => width == 4,
+            POWER => width == 1 && within(first_weight, 1, self.powers.len()),
             _ => width == 3,
         };
         must(fits, "values of the wrong width")?;
-        let per_key = if interpolation == CUBIC_SPLINE { 3 } else { 1 };
-        let values = u64::from(count) * per_key * u64::from(width);
+        let per_key: u32 = if interpolation == CUBIC_SPLINE { 3 } else { 1 };
+        let values = u64::from(count) * u64::from(per_key) * u64::from(width);
         let values = u32::try_from(values).map_err(|_| "absurdly many keyframes")?;
         must(within(first_value, values, self.keys.len()), "values out of range")?;
+        if path == POWER {
+            // Of a cubic keyframe the value is the second number of three.
+            let values = self.keys.get(first_value as usize..).unwrap_or_default().iter().take(values as usize);
+            let mut values = values.skip(per_key as usize / 2).step_by(per_key as usize);
+            must(values.all(|value| *value >= 0.0), "a power below 0")?;
+        }
         must(count > 0 && within(first_time, count, self.keys.len()), "times out of range")?;
         let times = self.keys.get(first_time as usize..).and_then(|keys| keys.get(..count as usize));
         must(times.is_some_and(|times| times.is_sorted()), "times that descend")

@@ -44,6 +44,14 @@ pub struct Rig {
     pub lights: Vec<Attachment>,
     /// Cameras that hang on nodes.
     pub cameras: Vec<Attachment>,
+    /// Factors on the power of lights at rest, none negative; [`POWER`] channels animate them. A factor of 0 is a light that
+    /// is switched off.
+    pub powers: Vec<f32>,
+    /// Instances all of whose emission a factor multiplies. Empty in a flat scene, where
+    /// [`FlatScene::light_powers`](super::FlatScene::light_powers) says it light by light.
+    pub dimmed_instances: Vec<Dimmer>,
+    /// Punctual lights that a factor multiplies. Empty in a flat scene, as above.
+    pub dimmed_lights: Vec<Dimmer>,
 }
 
 /// A coordinate system: `T * R * S * matrix` takes it to its parent's.
@@ -105,6 +113,8 @@ pub const ROTATION: u32 = 1;
 pub const SCALE: u32 = 2;
 /// [`Channel::path`]: weights of morph targets.
 pub const WEIGHTS: u32 = 3;
+/// [`Channel::path`]: a factor on the power of lights.
+pub const POWER: u32 = 4;
 
 /// [`Channel::interpolation`]: the value of the keyframe before.
 pub const STEP: u32 = 0;
@@ -113,13 +123,13 @@ pub const LINEAR: u32 = 1;
 /// [`Channel::interpolation`]: cubic Hermite; each keyframe has in-tangent, value and out-tangent.
 pub const CUBIC_SPLINE: u32 = 2;
 
-/// How one property of one node follows keyframes.
+/// How one property of one node, or one factor on the power of lights, follows keyframes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub struct Channel {
-    /// The node.
+    /// The node, or [`NONE`] for [`POWER`].
     pub node: u32,
-    /// [`TRANSLATION`], [`ROTATION`], [`SCALE`] or [`WEIGHTS`].
+    /// [`TRANSLATION`], [`ROTATION`], [`SCALE`], [`WEIGHTS`] or [`POWER`].
     pub path: u32,
     /// [`STEP`], [`LINEAR`] or [`CUBIC_SPLINE`].
     pub interpolation: u32,
@@ -131,7 +141,7 @@ pub struct Channel {
     pub first_time: u32,
     /// Index in [`Rig::keys`] of the first value.
     pub first_value: u32,
-    /// Index in [`Rig::weights`] of the first of `width` weights; 0 for other paths.
+    /// Index in [`Rig::weights`] of the first of `width` weights, or in [`Rig::powers`] of the factor; 0 for other paths.
     pub first_weight: u32,
 }
 
@@ -207,6 +217,15 @@ pub struct Attachment {
     pub node: u32,
 }
 
+/// What a factor on the power of lights dims.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Dimmer {
+    /// The instance or light.
+    pub target: u32,
+    /// Index in [`Rig::powers`].
+    pub power: u32,
+}
+
 /// How an instance of a rig moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Motion {
@@ -219,9 +238,9 @@ pub enum Motion {
 }
 
 impl Rig {
-    /// Whether nothing moves, whatever clip is played.
+    /// Whether nothing moves and no light changes, whatever clip is played.
     pub fn is_still(&self) -> bool {
-        self.instances.is_empty() && self.lights.is_empty() && self.cameras.is_empty()
+        self.instances.is_empty() && self.lights.is_empty() && self.cameras.is_empty() && self.powers.is_empty()
     }
 
     /// Adds a node; its index.
@@ -232,12 +251,28 @@ impl Rig {
 
     /// Adds a channel to the last clip: `values` one after another, `times` in seconds.
     pub fn add_channel(&mut self, node: u32, path: u32, interpolation: u32, times: &[f32], values: &[f32]) {
+        let placed = self.instances.iter().find(|placement| path == WEIGHTS && placement.node == node);
+        let first_weight = placed.map_or(0, |placement| placement.first_weight);
+        self.push_channel([node, path, interpolation, first_weight], times, values);
+    }
+
+    /// Adds a factor on the power of lights, which is `rest` where no clip says anything else; its index.
+    pub fn add_power(&mut self, rest: f32) -> u32 {
+        self.powers.push(rest);
+        self.powers.len() as u32 - 1
+    }
+
+    /// As [`Rig::add_channel`], for factor `power` on the power of lights.
+    pub fn add_power_channel(&mut self, power: u32, interpolation: u32, times: &[f32], values: &[f32]) {
+        self.push_channel([NONE, POWER, interpolation, power], times, values);
+    }
+
+    fn push_channel(&mut self, [node, path, interpolation, first_weight]: [u32; 4], times: &[f32], values: &[f32]) {
         let per_key = if interpolation == CUBIC_SPLINE { 3 } else { 1 };
         let first_time = self.keys.len() as u32;
         self.keys.extend(times);
         let first_value = self.keys.len() as u32;
         self.keys.extend(values);
-        let placed = self.instances.iter().find(|placement| path == WEIGHTS && placement.node == node);
         self.channels.push(Channel {
             node,
             path,
@@ -246,7 +281,7 @@ impl Rig {
             width: (values.len() / (per_key * times.len()).max(1)) as u32,
             first_time,
             first_value,
-            first_weight: placed.map_or(0, |placement| placement.first_weight),
+            first_weight,
         });
         if let Some(clip) = self.clips.last_mut() {
             clip.channel_count += 1;
@@ -286,7 +321,7 @@ impl Rig {
     pub fn moving_nodes(&self) -> Vec<bool> {
         let mut moving = vec![false; self.nodes.len()];
         let turned = self.spins.iter().map(|spin| spin.node);
-        let animated = self.channels.iter().filter(|channel| channel.path != WEIGHTS).map(|channel| channel.node);
+        let animated = self.channels.iter().filter(|channel| channel.path < WEIGHTS).map(|channel| channel.node);
         for node in turned.chain(animated) {
             if let Some(moving) = moving.get_mut(node as usize) {
                 *moving = true;

@@ -1,6 +1,6 @@
 //! Where everything is at a moment.
 
-use super::{NONE, Placement, ROTATION, Rig, SCALE, TRANSLATION, WEIGHTS, keyframes};
+use super::{NONE, POWER, Placement, ROTATION, Rig, SCALE, TRANSLATION, WEIGHTS, keyframes};
 use glam::{Mat4, Quat, Vec3};
 use std::f64::consts::TAU;
 
@@ -11,6 +11,8 @@ pub struct Pose {
     pub world: Vec<Mat4>,
     /// Of morph targets, as [`Rig::weights`].
     pub weights: Vec<f32>,
+    /// Factors on the power of lights, as [`Rig::powers`].
+    pub powers: Vec<f32>,
 }
 
 impl Rig {
@@ -28,6 +30,7 @@ impl Rig {
     fn evaluate(&self, clip: Option<usize>, time: f64) -> Pose {
         let mut nodes = self.nodes.clone();
         let mut weights = self.weights.clone();
+        let mut powers = self.powers.clone();
         let clip = clip.and_then(|clip| self.clips.get(clip));
         if let Some(clip) = clip {
             let local = local_time(time, clip.duration);
@@ -39,6 +42,10 @@ impl Rig {
                         let range = channel.first_weight as usize..(channel.first_weight + channel.width) as usize;
                         weights.get_mut(range).unwrap_or_default()
                     }
+                    (POWER, _) => powers
+                        .get_mut(channel.first_weight as usize..)
+                        .and_then(|rest| rest.get_mut(..1))
+                        .unwrap_or_default(),
                     (_, Some(value)) => value,
                     _ => continue,
                 };
@@ -63,7 +70,9 @@ impl Rig {
             let local = node.local();
             world.push(world.get(node.parent as usize).map_or(local, |parent| *parent * local));
         }
-        Pose { world, weights }
+        // A spline may swing below its keyframes, or out of all numbers.
+        powers.iter_mut().for_each(|power| *power = if power.is_finite() { power.max(0.0) } else { 0.0 });
+        Pose { world, weights, powers }
     }
 }
 
