@@ -57,11 +57,6 @@ fn still(scene: &FlatScene) -> Renderer {
 /// What is put in the place of what.
 type Plant = (&'static str, &'static str);
 
-/// Runs and margins of a comparison that shall find no bias.
-fn unbiased(runs: u32) -> (u32, Margins) {
-    (effort(runs), margins(MARGINS))
-}
-
 /// The renderer [`playing`] gives, on a device of its own, with a fault planted in its shaders.
 fn planted(scene: &FlatScene, speed: f64, (old, new): Plant) -> Renderer {
     let gpu = fresh_gpu();
@@ -69,16 +64,10 @@ fn planted(scene: &FlatScene, speed: f64, (old, new): Plant) -> Renderer {
     playing(&gpu, scene, speed)
 }
 
-fn compare(
-    what: &str,
-    renderer: &mut Renderer,
-    (runs, margins): (u32, Margins),
-    tile: u32,
-    reference: &Estimate,
-) -> Comparison {
+fn compare(what: &str, renderer: &mut Renderer, runs: u32, tile: u32, reference: &Estimate) -> Comparison {
     let estimate = Estimate::radiance(renderer, runs, FRAMES, tile).unwrap();
     assert!((renderer.time() - END).abs() < 1e-9, "{}", renderer.time());
-    let comparison = Comparison::new(&estimate, reference, margins);
+    let comparison = Comparison::new(&estimate, reference, MARGINS);
     println!("{what}: {comparison}");
     comparison
 }
@@ -89,8 +78,8 @@ fn the_mean_is_right_while_everything_moves() {
     // All of it in view but its lights.
     scene.cameras[0] = Camera::look_at("still", [0.0, 1.2, 3.4].into(), [0.0, 0.35, -0.3].into(), 42f32.to_radians());
     let scene = flatten(&scene);
-    let reference = Estimate::radiance(&mut still(&scene), 8, effort(100), TILE).unwrap();
-    let comparison = compare("moving", &mut playing(&gpu(), &scene, SPEED), unbiased(128), TILE, &reference);
+    let reference = Estimate::radiance(&mut still(&scene), 8, 100, TILE).unwrap();
+    let comparison = compare("moving", &mut playing(&gpu(), &scene, SPEED), 128, TILE, &reference);
     assert!(comparison.is_equivalent());
 }
 
@@ -207,12 +196,12 @@ fn faults_in_what_is_known_of_the_frame_before_are_caught() {
     ];
     for (what, scene, plant) in cases {
         let scene = flatten(&scene);
-        let reference = Estimate::radiance(&mut still(&scene), 8, effort(50), SIZE).unwrap();
+        let reference = Estimate::radiance(&mut still(&scene), 8, 50, SIZE).unwrap();
         // Without the plant the same test passes.
-        let right = compare("no fault", &mut playing(&gpu(), &scene, SPEED), unbiased(64), SIZE, &reference);
+        let right = compare("no fault", &mut playing(&gpu(), &scene, SPEED), 64, SIZE, &reference);
         assert!(right.is_equivalent(), "without the fault that '{what}'");
         let mut renderer = planted(&scene, SPEED, plant);
-        let wrong = compare(what, &mut renderer, (16, MARGINS), SIZE, &reference);
+        let wrong = compare(what, &mut renderer, 16, SIZE, &reference);
         assert!(wrong.is_caught(), "'{what}' went unnoticed");
     }
 }

@@ -56,16 +56,16 @@ const FRAMES: u32 = 16;
 fn reference() -> &'static Estimate {
     static REFERENCE: OnceLock<Estimate> = OnceLock::new();
     REFERENCE.get_or_init(|| {
-        let reference = Estimate::radiance(&mut path_tracer(flatten(&scene())), 16, effort(256), TILE).unwrap();
+        let reference = Estimate::radiance(&mut path_tracer(flatten(&scene())), 16, 256, TILE).unwrap();
         let (mean, error) = reference.0[0];
         println!("reference: mean {mean:.5} ± {:.3} %", 100.0 * error / mean);
         reference
     })
 }
 
-fn compare(what: &str, settings: &[(&str, &str)], runs: u32, margins: Margins) -> Comparison {
+fn compare(what: &str, settings: &[(&str, &str)], runs: u32) -> Comparison {
     let estimate = Estimate::radiance(&mut report(flatten(&scene()), settings), runs, FRAMES, TILE).unwrap();
-    let comparison = Comparison::new(&estimate, reference(), margins);
+    let comparison = Comparison::new(&estimate, reference(), MARGINS);
     println!("{what}: {comparison}");
     comparison
 }
@@ -89,7 +89,7 @@ fn configurations_equal_the_path_tracer() {
     for (configuration, runs) in
         [("a-naive", RUNS), ("b-ris", 40), ("c-temporal", 40), ("d-spatial", 40), ("e-both", 40)]
     {
-        let comparison = compare(configuration, &[("configuration", configuration)], effort(runs), margins(MARGINS));
+        let comparison = compare(configuration, &[("configuration", configuration)], runs);
         assert!(comparison.is_equivalent(), "{configuration} is not equivalent");
     }
 }
@@ -105,13 +105,10 @@ fn faults_are_caught() {
         (&[UNGUARDED, NO_SIMILARITY], "e-both"),
     ] {
         let settings = with_faults(configuration, faults);
-        let comparison = compare(&format!("{faults:?}, {configuration}"), &settings, RUNS / 4, MARGINS);
+        let comparison = compare(&format!("{faults:?}, {configuration}"), &settings, RUNS / 4);
         assert!(comparison.is_caught(), "{faults:?} went unnoticed with {configuration}");
     }
 }
-
-/// Highlights are noise: the mean over the picture alone, and less sharply than elsewhere.
-const SOFT_MARGINS: Margins = Margins { picture: 0.004, tile: 0.004 };
 
 /// On rough walls neighbours that pass the checks have nearly the same target function, and a merge that does not evaluate it
 /// again is hardly biased. On polished metal they have not.
@@ -122,9 +119,10 @@ fn on_polished_metal_checks_do_not_hide_the_target() {
         (material.metallic, material.roughness) = (1.0, 0.4);
     }
     let flat = flatten(&scene);
-    let reference = Estimate::radiance(&mut path_tracer(flat.clone()), 16, effort(256), SIZE).unwrap();
-    for (faults, runs, margins) in [(&[][..], effort(RUNS), margins(SOFT_MARGINS)), (&[TARGET], RUNS / 2, SOFT_MARGINS)]
-    {
+    // Highlights are noise: the mean over the picture alone, and less sharply than elsewhere.
+    let margins = Margins { picture: 0.004, tile: 0.004 };
+    let reference = Estimate::radiance(&mut path_tracer(flat.clone()), 16, 256, SIZE).unwrap();
+    for (faults, runs) in [(&[][..], RUNS), (&[TARGET], RUNS / 2)] {
         let mut renderer = report(flat.clone(), &with_faults("e-both", faults));
         let comparison =
             Comparison::new(&Estimate::radiance(&mut renderer, runs, FRAMES, SIZE).unwrap(), &reference, margins);
@@ -150,11 +148,11 @@ fn last_frames(renderer: &mut Renderer, runs: u32, step: impl Fn(&mut Renderer, 
 const MOVING_FRAMES: u32 = 4;
 
 /// The camera slides by five centimetres a frame to where the reference has it.
-fn compare_sliding(faults: &[&str], runs: u32, margins: Margins) -> Comparison {
+fn compare_sliding(faults: &[&str], runs: u32) -> Comparison {
     let mut renderer = report(flatten(&scene()), &with_faults("c-temporal", faults));
     renderer.set_speed(0.0);
     let slide = |renderer: &mut Renderer, before| renderer.set_camera(&from_inside(-0.05 * before as f32));
-    let comparison = Comparison::new(&last_frames(&mut renderer, runs, slide), reference(), margins);
+    let comparison = Comparison::new(&last_frames(&mut renderer, runs, slide), reference(), MARGINS);
     println!("{faults:?}, c-temporal, camera sliding: {comparison}");
     comparison
 }
@@ -162,10 +160,9 @@ fn compare_sliding(faults: &[&str], runs: u32, margins: Margins) -> Comparison {
 /// The checks that the report lacks change noise; the weights decide about bias.
 #[test]
 fn missing_checks_are_biased_with_count_weights_alone() {
-    let unchecked = with_faults("d-spatial", &[NO_SIMILARITY]);
-    assert!(compare("[], d-spatial", &unchecked, effort(RUNS), margins(MARGINS)).is_equivalent());
-    assert!(compare_sliding(&[NO_REPROJECTION], effort(4 * RUNS), margins(MARGINS)).is_equivalent());
-    assert!(compare_sliding(&[NO_REPROJECTION, COUNT_WEIGHTS], RUNS, MARGINS).is_caught());
+    assert!(compare("[], d-spatial", &with_faults("d-spatial", &[NO_SIMILARITY]), RUNS).is_equivalent());
+    assert!(compare_sliding(&[NO_REPROJECTION], 4 * RUNS).is_equivalent());
+    assert!(compare_sliding(&[NO_REPROJECTION, COUNT_WEIGHTS], RUNS).is_caught());
 }
 
 #[test]
@@ -174,16 +171,14 @@ fn the_mean_is_right_while_lights_revolve() {
     let (step, end) = (0.1, 0.3);
     let mut still = path_tracer(flatten(&scene()));
     still.set_time(end);
-    let reference = Estimate::radiance(&mut still, 16, effort(256), TILE).unwrap();
-    for (faults, runs, margins) in
-        [(&[][..], effort(4 * RUNS), margins(MARGINS)), (&[COUNT_WEIGHTS, NO_SIMILARITY], RUNS, MARGINS)]
-    {
+    let reference = Estimate::radiance(&mut still, 16, 256, TILE).unwrap();
+    for (faults, runs) in [(&[][..], 4 * RUNS), (&[COUNT_WEIGHTS, NO_SIMILARITY], RUNS)] {
         let mut renderer = report(flatten(&scene()), &with_faults("e-both", faults));
         renderer.set_speed(60.0 * step);
         renderer.set_time(end - step * f64::from(MOVING_FRAMES - 1));
         let estimate = last_frames(&mut renderer, runs, |_, _| ());
         assert!((renderer.time() - end).abs() < 1e-9, "{}", renderer.time());
-        let comparison = Comparison::new(&estimate, &reference, margins);
+        let comparison = Comparison::new(&estimate, &reference, MARGINS);
         println!("{faults:?}, e-both, lights revolving: {comparison}");
         assert!(if faults.is_empty() { comparison.is_equivalent() } else { comparison.is_caught() });
     }
