@@ -105,7 +105,7 @@ fn embedded(folder: &Path) -> String {
 
 /// WGSL without its line comments (it has no strings that could hold a `//`).
 fn without_comments(text: &str) -> String {
-    text.lines().flat_map(|line| [line.split("//").next().unwrap_or_default().trim_end(), "\n"]).collect()
+    text.lines().flat_map(|line| [line.split("//").next().unwrap_or_default().trim(), "\n"]).collect()
 }
 
 fn list<T>(items: &[T], show: impl Fn(&T) -> String) -> String {
