@@ -53,6 +53,13 @@ pub struct FrameCounters {
     pub inf: u64,
 }
 
+impl FrameCounters {
+    /// Pixel samples left out of the film because they were not finite.
+    pub fn not_finite(&self) -> u64 {
+        self.nan + self.inf
+    }
+}
+
 /// A scene being rendered.
 pub struct Renderer {
     gpu: Gpu,

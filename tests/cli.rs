@@ -192,6 +192,8 @@ fn wrong_names_and_values_are_exit_code_2_and_say_what_is_right() {
     render("missing.glb", &["--set", "film.exposure=bright"], "BAD_VALUE", "exposure");
     render("missing.glb", &["--set", "render.max_depth=0"], "BAD_VALUE", "max_depth");
     render("missing.glb", &["--set", "light_samples=none"], "BAD_VALUE", "light_samples");
+    let unbiased = ["--technique", "restir-di-decoupled", "--set", "visibility=mis", "--set", "checkerboard=yes"];
+    render("missing.glb", &unbiased, "BAD_VALUE", "mis contradicts checkerboard");
     render("builtin:cornell", &["--spp", "4", "--accumulate", "no"], "BAD_VALUE", "--spp");
     assert!(folder.names().is_empty());
 }

@@ -48,20 +48,24 @@ fn every_kind_of_light() -> FlatScene {
 #[test]
 fn every_kind_of_light_is_drawn_as_often_as_it_says() {
     let gpu = gpu();
-    let estimate = |gpu: &Gpu, technique: &str, settings: &[(&str, &str)], frames| {
+    let estimate = |gpu: &Gpu, technique: &str, settings: &[(&str, &str)], (runs, frames)| {
         let settings = [DIRECT, settings].concat();
         let mut renderer = renderer(gpu, every_kind_of_light(), [48; 2], technique, &settings);
-        Estimate::radiance(&mut renderer, 48, frames, 48).unwrap()
+        Estimate::radiance(&mut renderer, runs, frames, 48).unwrap()
     };
-    let truth = estimate(&gpu, "path-tracer", &[], effort(64));
+    let truth = estimate(&gpu, "path-tracer", &[], (48, proof().effort(64)));
     let settings = [("indirect", "no"), ("visibility", "mis"), ("candidates", "32"), ("history_cap", "4")];
-    let comparison = Comparison::new(&estimate(&gpu, TECHNIQUE, &settings, effort(32)), &truth, margins(MARGINS));
+    let comparison = Comparison::new(
+        &estimate(&gpu, TECHNIQUE, &settings, (48, proof().effort(32))),
+        &truth,
+        proof().margins(MARGINS),
+    );
     println!("every kind of light: {comparison}");
     assert!(comparison.is_equivalent());
     // A plant: spheres as if half of each were drawn.
     let gpu = fresh_gpu();
     gpu.plant("light.pmf / (4.0 * PI", "light.pmf / (2.0 * PI").unwrap();
-    let planted = estimate(&gpu, TECHNIQUE, &settings, 8);
+    let planted = estimate(&gpu, TECHNIQUE, &settings, (12, 8));
     let comparison = Comparison::new(&planted, &truth, MARGINS);
     println!("half spheres: {comparison}");
     assert!(comparison.is_caught());

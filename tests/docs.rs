@@ -165,6 +165,43 @@ fn prose(page: &str) -> Vec<&str> {
         .collect()
 }
 
+/// How many cells a row of a Markdown table has. A `|` ends one, in code as well, unless it is escaped.
+fn cells(row: &str) -> usize {
+    row.trim().replace("\\|", "").matches('|').count() - 1
+}
+
+/// Rows of tables that have another number of cells than their head, and how many rows there are.
+fn uneven_rows(page: &str) -> (Vec<&str>, usize) {
+    let (mut uneven, mut rows, mut head) = (Vec::new(), 0, None);
+    for line in prose(page) {
+        if line.starts_with('|') {
+            rows += 1;
+            uneven.extend((*head.get_or_insert(cells(line)) != cells(line)).then_some(line));
+        } else {
+            head = None;
+        }
+    }
+    (uneven, rows)
+}
+
+#[test]
+fn every_row_of_a_table_has_as_many_cells_as_its_head() {
+    let mut seen = 0;
+    for path in pages() {
+        let page = read(&path);
+        let (uneven, rows) = uneven_rows(&page);
+        seen += rows;
+        assert!(uneven.is_empty(), "{}: not as many cells as the head:\n{}", path.display(), uneven.join("\n"));
+    }
+    assert!(seen > 0, "no tables were found");
+}
+
+#[test]
+fn an_uneven_row_is_seen() {
+    let page = "| a | b |\n|---|---|\n| 1/\\|Z\\| | 2 |\n| 1/|Z| | 2 |\n| 1 |\n\n| a |\n|---|\n| `x` |\n";
+    assert_eq!(uneven_rows(page), (vec!["| 1/|Z| | 2 |", "| 1 |"], 8));
+}
+
 /// The targets of all links and pictures.
 fn links(page: &str) -> Vec<String> {
     let parts = prose(page).into_iter().flat_map(|line| line.split("](").skip(1));

@@ -5,12 +5,13 @@
 
 mod support;
 
-use glam::{Mat4, Quat, Vec3};
+use glam::{Quat, Vec3};
 use restir::lab::truth::equivalence::{Comparison, Estimate, Margins, Z_95, pictures};
 use restir::scene::rig::{Attachment, LINEAR, Node, Placement, ROTATION, TRANSLATION};
-use restir::scene::{Camera, Instance, Material, Mesh, Scene, shapes};
+use restir::scene::{Camera, Material, Mesh, Scene, shapes};
 use restir::{FlatScene, Gpu, Image, Renderer};
 use std::f32::consts::{FRAC_PI_2, TAU};
+use support::above::{self, WHITE, floor, place};
 use support::*;
 
 const SIZE: u32 = 64;
@@ -67,7 +68,7 @@ fn planted(scene: &FlatScene, speed: f64, (old, new): Plant) -> Renderer {
 fn compare(what: &str, renderer: &mut Renderer, runs: u32, tile: u32, reference: &Estimate) -> Comparison {
     let estimate = Estimate::radiance(renderer, runs, FRAMES, tile).unwrap();
     assert!((renderer.time() - END).abs() < 1e-9, "{}", renderer.time());
-    let comparison = Comparison::new(&estimate, reference, MARGINS);
+    let comparison = Comparison::new(&estimate, reference, proof().margins(MARGINS));
     println!("{what}: {comparison}");
     comparison
 }
@@ -78,29 +79,18 @@ fn the_mean_is_right_while_everything_moves() {
     // All of it in view but its lights.
     scene.cameras[0] = Camera::look_at("still", [0.0, 1.2, 3.4].into(), [0.0, 0.35, -0.3].into(), 42f32.to_radians());
     let scene = flatten(&scene);
-    let reference = Estimate::radiance(&mut still(&scene), 8, 100, TILE).unwrap();
-    let comparison = compare("moving", &mut playing(&gpu(), &scene, SPEED), 128, TILE, &reference);
+    let reference = Estimate::radiance(&mut still(&scene), 8, proof().effort(100), TILE).unwrap();
+    let comparison = compare("moving", &mut playing(&gpu(), &scene, SPEED), proof().effort(128), TILE, &reference);
     assert!(comparison.is_equivalent());
 }
 
-const WHITE: u32 = 0;
 const LAMP: u32 = 1;
 
-/// A scene of nothing yet, seen straight from above: a square metre about the origin is in view.
+/// The scene seen from above, with a second material that shines.
 fn from_above() -> Scene {
-    let white =
-        Material { base_color: Vec3::splat(0.7).extend(1.0), metallic: 0.0, roughness: 1.0, ..Material::default() };
-    let lamp = Material { emissive: Vec3::splat(20.0), ..white.clone() };
-    let mut camera = Camera::look_at("above", Vec3::new(0.0, 3.0, 0.0), Vec3::X, 2.0 * (0.5f32 / 3.0).atan());
-    (camera.forward, camera.up) = (Vec3::NEG_Y, Vec3::NEG_Z);
-    let mut scene = Scene { materials: vec![white, lamp], cameras: vec![camera], ..Scene::default() };
-    scene.rig.add_clip("motion");
+    let mut scene = above::scene();
+    scene.materials.push(Material { emissive: Vec3::splat(20.0), ..scene.materials[WHITE as usize].clone() });
     scene
-}
-
-fn place(scene: &mut Scene, mesh: Mesh) {
-    scene.instances.push(Instance { mesh: scene.meshes.len() as u32, transform: Mat4::IDENTITY });
-    scene.meshes.push(mesh);
 }
 
 /// A pose of a node.
@@ -120,8 +110,7 @@ fn mover(scene: &mut Scene, (p0, r0): Pose, (p1, r1): Pose) -> u32 {
 
 /// Places a mesh on a node.
 fn hang(scene: &mut Scene, mesh: Mesh, node: u32) {
-    let instance = scene.instances.len() as u32;
-    place(scene, mesh);
+    let instance = place(scene, mesh);
     scene.rig.instances.push(Placement::rigid(instance, node));
 }
 
@@ -132,10 +121,6 @@ fn slide(from: Vec3, to: Vec3) -> [Pose; 2] {
 /// A turn about the z axis, in degrees.
 fn turn(at: Vec3, from: f32, to: f32) -> [Pose; 2] {
     [from, to].map(|angle| (at, Quat::from_rotation_z(angle.to_radians())))
-}
-
-fn floor(half: f32) -> Mesh {
-    shapes::parallelogram(Vec3::new(-half, 0.0, -half), 2.0 * half * Vec3::Z, 2.0 * half * Vec3::X, WHITE)
 }
 
 /// A square lamp about a point, beside what is in view, that shines towards -x.
@@ -194,13 +179,13 @@ fn faults_in_what_is_known_of_the_frame_before_are_caught() {
             ("            instance = previous_instance(instance);", ""),
         ),
     ];
-    for (what, scene, plant) in cases {
-        let scene = flatten(&scene);
+    for (what, scene, plant) in support::cases(&cases) {
+        let scene = flatten(scene);
         let reference = Estimate::radiance(&mut still(&scene), 8, 50, SIZE).unwrap();
         // Without the plant the same test passes.
-        let right = compare("no fault", &mut playing(&gpu(), &scene, SPEED), 64, SIZE, &reference);
+        let right = compare("no fault", &mut playing(&gpu(), &scene, SPEED), proof().effort(64), SIZE, &reference);
         assert!(right.is_equivalent(), "without the fault that '{what}'");
-        let mut renderer = planted(&scene, SPEED, plant);
+        let mut renderer = planted(&scene, SPEED, *plant);
         let wrong = compare(what, &mut renderer, 16, SIZE, &reference);
         assert!(wrong.is_caught(), "'{what}' went unnoticed");
     }
@@ -243,7 +228,7 @@ const PATH: Vec3 = Vec3::new(0.5 * PERIOD * (FRAMES - 1) as f32, 0.0, 0.0);
 
 fn ridges_that_slide() -> Scene {
     let mut scene = from_above();
-    lamps(&mut scene).into_iter().for_each(|lamp| place(&mut scene, lamp));
+    lamps(&mut scene).into_iter().for_each(|lamp| _ = place(&mut scene, lamp));
     let [from, to] = slide(-PATH, Vec3::ZERO);
     let node = mover(&mut scene, from, to);
     hang(&mut scene, ridges(), node);
@@ -252,7 +237,7 @@ fn ridges_that_slide() -> Scene {
 
 fn camera_that_slides() -> Scene {
     let mut scene = from_above();
-    lamps(&mut scene).into_iter().for_each(|lamp| place(&mut scene, lamp));
+    lamps(&mut scene).into_iter().for_each(|lamp| _ = place(&mut scene, lamp));
     place(&mut scene, ridges());
     let position = scene.cameras[0].position;
     let down = Quat::from_rotation_x(-FRAC_PI_2);
@@ -312,12 +297,12 @@ fn history_follows_what_moves() {
         // As if there were no history.
         ("lights", lamps_that_revolve(), ("if reprojected.x < 0 {", "if true {")),
     ];
-    for (what, scene, plant) in cases {
-        let scene = flatten(&scene);
+    for (what, scene, plant) in support::cases(&cases) {
+        let scene = flatten(scene);
         let truth = render(&mut still(&scene), 400);
         let rest = last_error(&mut playing(&gpu(), &scene, 0.0), &truth);
         let moving = ratio(last_error(&mut playing(&gpu(), &scene, SPEED), &truth), rest);
-        let mut renderer = planted(&scene, SPEED, plant);
+        let mut renderer = planted(&scene, SPEED, *plant);
         let wrong = ratio(last_error(&mut renderer, &truth), rest);
         println!(
             "{what}: {:.2} ± {:.2} times the error at rest; {:.2} ± {:.2} with the plant",

@@ -4,6 +4,7 @@ mod support;
 
 use restir::lab::experiment::{Axis, Metric};
 use restir::lab::settings::{Settings, Value};
+use restir::lab::truth::equivalence::counted_pictures;
 use restir::lab::{self, Experiment, Options, Outcome, library};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -152,8 +153,18 @@ fn what_makes_no_sense_is_refused() {
         ("\"bias\"", "\"beauty\"", "BAD_FILE", "beauty"),
         ("name = \"restir-di\"", "name = \"path tracing, averaged\"", "BAD_FILE", "two are called"),
         ("baseline = \"path tracing, averaged\"", "baseline = \"ris\"", "BAD_FILE", "no series"),
+        ("accumulate = true", "accumulate = false", "BAD_FILE", "average several frames"),
+        ("frames = [1, 2, 4, 8, 16, 32, 64, 128, 256, 512]", "frames = [512]", "BAD_FILE", "average several frames"),
+        (
+            "metrics = [\"mse\", \"bias\", \"rays\"]",
+            "metrics = [\"bias\", \"rays\"]",
+            "BAD_FILE",
+            "no metric is an error",
+        ),
         ("x = \"frame\"", "x = \"sweep\"", "BAD_FILE", "no sweep"),
         ("frames = 64", "frames = 1", "BAD_FILE", "reference"),
+        ("x = \"frame\"", "x = \"frame\"\nview = \"beauty\"", "BAD_FILE", "no view 'beauty'"),
+        ("x = \"frame\"", "x = \"frame\"\nview = \"duplicates\"", "BAD_FILE", "path-tracer has no view"),
         ("[quick]", "[motion]\nspeed = 1.0\n[quick]", "BAD_FILE", "motion"),
         ("[quick]", "[[sweep]]\nkey = \"light_samples\"\nvalues = [1]\n[quick]", "UNKNOWN_NAME", "light_samples"),
         ("[quick]", "[[sweep]]\nkey = \"scene\"\nvalues = [\"x\"]\n[quick]", "BAD_FILE", "'*'"),
@@ -166,6 +177,61 @@ fn what_makes_no_sense_is_refused() {
         assert!(error.to_string().contains(word), "{new}: {error}");
     }
     assert_eq!(library::find("light-sample").expect_err("unknown").code(), "UNKNOWN_NAME");
+}
+
+/// What contradicts itself is refused with the file, each point as a whole, and without a device.
+#[test]
+fn contradictory_settings_are_refused() {
+    let parse = |settings: &str, values: &str| {
+        let sweep = format!("[[sweep]]\nkey = \"visibility\"\nvalues = [{values}]\n[quick]");
+        let text = TINY.replace("technique = \"path-tracer\"", "technique = \"restir-di-decoupled\"");
+        let text = text.replace("name = \"restir-di\"", "name = \"the other\"\ntechnique = \"restir-di-decoupled\"");
+        let text = text.replace("indirect = false", &format!("indirect = false, {settings}"));
+        Experiment::parse("tiny.toml", &if values.is_empty() { text } else { text.replace("[quick]", &sweep) })
+    };
+    for (settings, values) in [
+        ("visibility = \"mis\", checkerboard = true", ""),
+        ("visibility = \"mis\", visibility_reuse_radius = 15", ""),
+        ("checkerboard = true", "\"decoupled\", \"mis\""),
+    ] {
+        let error = parse(settings, values).expect_err(settings);
+        assert_eq!(error.code(), "BAD_VALUE", "{settings}: {error}");
+        assert!(error.to_string().contains("mis contradicts"), "{settings}: {error}");
+    }
+    for (settings, values) in [
+        ("visibility = \"mis\", checkerboard = false", ""),
+        ("checkerboard = true", "\"decoupled\", \"keep\""),
+        // Every point has another visibility.
+        ("visibility = \"mis\", checkerboard = true", "\"decoupled\""),
+    ] {
+        parse(settings, values).unwrap_or_else(|error| panic!("{settings}, swept {values}: {error}"));
+    }
+}
+
+/// The film leaves such samples out, so that a picture does not show them: proofs and measurements count them.
+#[test]
+fn samples_that_are_not_finite_are_counted() {
+    let faulty = [("fault_unguarded_pdf", "true")];
+    for (settings, any) in [(&[][..], false), (&faulty, true)] {
+        let mut renderer = renderer(&gpu(), builtin("cornell-64"), [24, 16], "restir-report", settings);
+        let (pictures, not_finite) = counted_pictures(&mut renderer, 2, 2).unwrap();
+        assert_eq!((pictures.len(), not_finite > 0), (2, any), "{settings:?}: {not_finite}");
+    }
+    let (out, cache) = (Folder::new("lossy-out"), Folder::new("lossy-cache"));
+    let text = TINY.replace("name = \"restir-di\"", "name = \"faulty\"\ntechnique = \"restir-report\"");
+    let mut experiment =
+        Experiment::parse("tiny.toml", &text.replace("builtin:cornell", "builtin:cornell-64")).unwrap();
+    experiment.series[0].frames = Some(vec![1, 2]);
+    experiment.series[1].settings.insert("fault_unguarded_pdf".to_owned(), Value("true".to_owned()));
+    run(&out.0, &cache.0, &experiment, false);
+    let csv = out.read("tiny.csv");
+    let lines: Vec<Vec<&str>> = csv.lines().map(|line| line.rsplit(',').collect()).collect();
+    assert_eq!(lines[0][1], "not_finite");
+    for line in &lines[1..] {
+        let count: f64 = line[1].parse().unwrap();
+        assert_eq!(count > 0.0, line.contains(&"faulty"), "{line:?}");
+    }
+    assert!(out.read("tiny.md").contains("not finite are left out, of a picture at most and on average: faulty ("));
 }
 
 #[test]

@@ -105,8 +105,8 @@ fn disagreements(scenes: &[(&str, usize, &str)]) -> Vec<String> {
         let settings = [("render.max_depth", DEPTH)];
         let mut renderer = renderer(&gpu, flatten(&matte(name, *camera)), [SIZE; 2], "path-tracer", &settings);
         renderer.set_accumulate(true);
-        let estimate = Estimate::radiance(&mut renderer, RUNS, effort(FRAMES), TILE).expect("pictures");
-        let comparison = Comparison::new(&estimate, &reference, margins(MARGINS));
+        let estimate = Estimate::radiance(&mut renderer, RUNS, proof().effort(FRAMES), TILE).expect("pictures");
+        let comparison = Comparison::new(&estimate, &reference, proof().margins(MARGINS));
         println!("{name}: {comparison}");
         if !comparison.is_equivalent() {
             failed.push(format!("{name}: {comparison}"));

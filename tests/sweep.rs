@@ -53,7 +53,7 @@ fn random_settings_render() {
     let scenes = ["cornell-64", "glossy-spheres", "many-lights:20"].map(builtin);
     let mut random = Random(0x5eed_0004);
     let mut slowest = (Duration::ZERO, String::new());
-    for i in 0..effort(SETS) as usize {
+    for i in 0..proof().effort(SETS) as usize {
         let technique = techniques[i % techniques.len()];
         let scene = &scenes[(i / techniques.len()) % scenes.len()];
         let mut renderer = renderer(&gpu, scene.clone(), SIZE, technique.id, &[]);

@@ -11,12 +11,11 @@ use restir::scene::area_light::{AreaLight, Outline};
 use restir::scene::gpu_types::{LIGHT_ENVIRONMENT, Light, NONE};
 use restir::scene::rig::{Attachment, CUBIC_SPLINE, Dimmer, LINEAR, Node, Placement, STEP, TRANSLATION};
 use restir::scene::stage::Stage;
-use restir::scene::{
-    Camera, Environment, Instance, Material, Mesh, PunctualKind, PunctualLight, Scene, builtin as scenes, gltf, shapes,
-};
+use restir::scene::{Environment, Material, PunctualKind, PunctualLight, Scene, builtin as scenes, gltf, shapes};
 use restir::{Error, FlatScene, Gpu, Renderer, Result};
 use serde_json::{Value, json};
 use std::time::Instant;
+use support::above::{self, place};
 use support::gltf_writer::Writer;
 use support::*;
 
@@ -35,20 +34,10 @@ const HISTORIES: [[f32; FRAMES as usize]; 3] = [[1.0, 0.5, 0.0, 1.0], [0.0, 1.0,
 /// What every light weighs in the table at full power.
 const WEIGHT: f32 = 0.3;
 
-fn place(scene: &mut Scene, mesh: Mesh) {
-    scene.instances.push(Instance { mesh: scene.meshes.len() as u32, transform: Mat4::IDENTITY });
-    scene.meshes.push(mesh);
-}
-
-/// A floor seen straight from above, a square metre of it in view.
+/// A floor seen straight from above.
 fn floor() -> Scene {
-    let white =
-        Material { base_color: Vec3::splat(0.7).extend(1.0), metallic: 0.0, roughness: 1.0, ..Material::default() };
-    let mut camera = Camera::look_at("above", Vec3::new(0.0, 3.0, 0.0), Vec3::X, 2.0 * (0.5f32 / 3.0).atan());
-    (camera.forward, camera.up) = (Vec3::NEG_Y, Vec3::NEG_Z);
-    let mut scene = Scene { materials: vec![white], cameras: vec![camera], ..Scene::default() };
-    place(&mut scene, shapes::parallelogram(Vec3::new(-1.0, 0.0, -1.0), 2.0 * Vec3::Z, 2.0 * Vec3::X, 0));
-    scene.rig.add_clip("switching");
+    let mut scene = above::scene();
+    place(&mut scene, above::floor(1.0));
     scene
 }
 
@@ -82,10 +71,10 @@ fn lamps() -> Scene {
         // A square of two triangles: half its area times its radiance is the weight.
         let (u, v) = (0.2 * Vec3::Z, 0.2 * Vec3::Y);
         let emissive = Vec3::splat(WEIGHT / 0.02);
-        scene.rig.dimmed_instances.push(Dimmer { target: scene.instances.len() as u32, power });
         let material = scene.materials.len() as u32;
         scene.materials.push(Material { emissive, double_sided: true, ..scene.materials[0].clone() });
-        place(&mut scene, shapes::parallelogram(at(0.0) - 0.5 * (u + v), u, v, material));
+        let target = place(&mut scene, shapes::parallelogram(at(0.0) - 0.5 * (u + v), u, v, material));
+        scene.rig.dimmed_instances.push(Dimmer { target, power });
 
         scene.rig.dimmed_instances.push(Dimmer { target: scene.instances.len() as u32, power });
         let (radius, area) = (0.08, 4.0 * std::f32::consts::PI * 0.08 * 0.08);

@@ -108,11 +108,13 @@ pub enum Metric {
     LightingMs,
     /// Rays a pixel and frame.
     Rays,
+    /// Samples left out of the picture because they were not finite.
+    NotFinite,
 }
 
 impl Metric {
     /// Every metric, in the order of the CSV's columns.
-    pub const ALL: [Metric; 9] = [
+    pub const ALL: [Metric; 10] = [
         Metric::Mse,
         Metric::Rmse,
         Metric::Relmse,
@@ -122,6 +124,7 @@ impl Metric {
         Metric::GpuMs,
         Metric::LightingMs,
         Metric::Rays,
+        Metric::NotFinite,
     ];
 
     /// Its name in files.
@@ -136,6 +139,7 @@ impl Metric {
             Metric::GpuMs => "gpu-ms",
             Metric::LightingMs => "lighting-ms",
             Metric::Rays => "rays",
+            Metric::NotFinite => "not-finite",
         }
     }
 
@@ -151,12 +155,13 @@ impl Metric {
             Metric::GpuMs => "all passes, ms",
             Metric::LightingMs => "lighting, ms",
             Metric::Rays => "rays a pixel",
+            Metric::NotFinite => "samples not finite",
         }
     }
 
-    /// Whether it is judged by the reference.
+    /// Whether it is a distance from the reference, which falls with time by powers; the signed bias is none.
     pub fn is_error(self) -> bool {
-        matches!(self, Metric::Mse | Metric::Rmse | Metric::Relmse | Metric::Mape | Metric::Bias)
+        matches!(self, Metric::Mse | Metric::Rmse | Metric::Relmse | Metric::Mape)
     }
 
     /// Whether it is a time: one number a run, however many of its frames are judged.
@@ -225,7 +230,7 @@ pub struct Reference {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EqualTime {
-    /// The name of a series with several frames.
+    /// The name of a series that averages several frames.
     pub baseline: String,
 }
 
@@ -331,6 +336,27 @@ impl Experiment {
         series.technique.as_deref().unwrap_or(&self.technique)
     }
 
+    /// The judged frames of a series.
+    pub fn frames<'a>(&'a self, series: &'a Series) -> &'a [u32] {
+        series.frames.as_deref().unwrap_or(&self.frames)
+    }
+
+    /// Whether a series averages its frames.
+    pub fn accumulates(&self, series: &Series) -> bool {
+        series.accumulate.unwrap_or(self.accumulate)
+    }
+
+    /// Picture sizes: those that are swept, else the one there is.
+    ///
+    /// # Errors
+    /// `BAD_FILE` for a value that is none; `name` is for that.
+    pub(super) fn sizes(&self, name: &str) -> Result<Vec<[u32; 2]>> {
+        match self.sweeps.first().filter(|sweep| sweep.key == "size") {
+            Some(sweep) => sweep.values.iter().map(|value| parse_size(name, value)).collect(),
+            None => Ok(vec![self.size]),
+        }
+    }
+
     fn check(&self, name: &str) -> Result<()> {
         let bad = |place: &str, what: String| Err(Error::bad_file(name, place, what));
         if self.scenes.is_empty() {
@@ -361,7 +387,7 @@ impl Experiment {
             return bad("x", "there is no sweep".into());
         }
         settings::check("path-tracer", &self.reference.settings)?;
-        let sweep = self.sweeps.first();
+        self.sizes(name)?;
         for place in &self.scenes {
             self.check_scene(name, place)?;
         }
@@ -372,7 +398,7 @@ impl Experiment {
             known.reduce(|one, other| one.or(other)).unwrap_or_else(|| techniques::ALL[0].spec(key))?;
         }
         for series in &curves {
-            let frames = series.frames.as_ref().unwrap_or(&self.frames);
+            let frames = self.frames(series);
             let rising = frames.windows(2).all(|pair| pair[0] < pair[1]);
             if frames.is_empty() || frames[0] == 0 || frames.iter().any(|f| *f > MOST_FRAMES) || !rising {
                 return bad("frames", format!("rising numbers from 1 to {MOST_FRAMES} are wanted"));
@@ -380,33 +406,31 @@ impl Experiment {
             if curves.iter().filter(|other| other.name == series.name).count() > 1 {
                 return bad("series", format!("two are called '{}'", series.name));
             }
-            let accumulate = series.accumulate.unwrap_or(self.accumulate);
-            if self.motion.is_some() && (accumulate || frames.len() > 1) {
+            if self.motion.is_some() && (self.accumulates(series) || frames.len() > 1) {
                 return bad("motion", "what moves is judged in one frame, which is not averaged".into());
             }
             let technique = self.technique(series);
             if let Some(view) = self.view.as_deref().filter(|view| !has_view(technique, view)) {
                 return bad("view", format!("{technique} has no view '{view}'"));
             }
-            for place in &self.scenes {
-                settings::check(technique, &self.settings_of(place, series, None))?;
-            }
-            for value in sweep.iter().flat_map(|sweep| &sweep.values) {
-                match sweep.map(|sweep| sweep.key.as_str()) {
-                    Some("scene") => {}
-                    Some("size") => drop(parse_size(name, value)?),
-                    Some(key) => {
-                        settings::check(technique, &Settings::from([(key.to_owned(), value.clone())]))?;
-                    }
-                    None => {}
-                }
+            // Those of each point as a whole, for settings may contradict each other.
+            let values = self.sweeps.first().map_or(vec![None], |sweep| sweep.values.iter().map(Some).collect());
+            for (place, value) in self.scenes.iter().flat_map(|place| values.iter().map(move |value| (place, *value))) {
+                settings::check(technique, &self.settings_of(place, series, value))?;
             }
         }
-        let baseline = self.equal_time.as_ref().map(|equal| &equal.baseline);
-        match baseline.filter(|baseline| !curves.iter().any(|series| series.name == **baseline)) {
-            Some(baseline) => bad("equal_time.baseline", format!("no series is called '{baseline}'")),
-            None => Ok(()),
+        let Some(EqualTime { baseline }) = &self.equal_time else { return Ok(()) };
+        let Some(series) = curves.iter().find(|series| series.name == *baseline) else {
+            return bad("equal_time.baseline", format!("no series is called '{baseline}'"));
+        };
+        // Between two of its frames lies what it would have had at another time.
+        if !self.accumulates(series) || self.frames(series).len() < 2 {
+            return bad("equal_time.baseline", format!("'{baseline}' does not average several frames"));
         }
+        if !self.metrics.iter().any(|metric| metric.is_error()) {
+            return bad("equal_time", "no metric is an error".into());
+        }
+        Ok(())
     }
 
     /// Whether scene names can be right; what is in a file is seen when it is read.

@@ -68,6 +68,8 @@ pub struct Reading {
     pub bias: Option<f64>,
     /// Rays a pixel in this frame.
     pub rays: f64,
+    /// Samples left out of the picture because they were not finite.
+    pub not_finite: u64,
 }
 
 impl Run {
@@ -84,6 +86,7 @@ impl Run {
             Metric::GpuMs => self.gpu_ms,
             Metric::LightingMs => self.lighting_ms,
             Metric::Rays => Some(reading.rays),
+            Metric::NotFinite => Some(reading.not_finite as f64),
         }
     }
 
@@ -107,7 +110,7 @@ impl Task<'_> {
         let Task { scene, camera, motion, size, technique, settings, accumulate, frames, seed } = self;
         let settings = settings::describe(settings);
         format!(
-            "run 3|shaders {shaders}|scene {scene}|{camera:?}|{motion:?}|{size:?}|{technique}|{settings}|accumulate \
+            "run 4|shaders {shaders}|scene {scene}|{camera:?}|{motion:?}|{size:?}|{technique}|{settings}|accumulate \
              {accumulate}|frames {frames:?}|seed {seed}|reference {reference}|{adapter}"
         )
     }
@@ -162,10 +165,11 @@ impl Task<'_> {
         seen
     }
 
-    /// Renders and judges. Gives the numbers and the picture of the last frame.
+    /// Renders and judges. Gives the numbers and the picture of the last frame. Samples that are not finite are left out
+    /// of pictures, and counted.
     ///
     /// # Errors
-    /// Those of rendering; `BAD_VALUE` where a picture has values that are not finite.
+    /// Those of rendering; `BAD_VALUE` where a picture has values that are not finite all the same, as sums may overflow.
     pub fn measure(&self, renderer: &mut Renderer, reference: &Image) -> Result<(Run, Image)> {
         self.prepare(renderer)?;
         let pixels = f64::from(self.size[0]) * f64::from(self.size[1]);
@@ -198,7 +202,7 @@ impl Task<'_> {
                 continue;
             }
             let image = block_on(renderer.read_image())?;
-            let rays = block_on(renderer.counters())?.rays as f64 / pixels;
+            let counters = block_on(renderer.counters())?;
             let mape = Some(mape(&image, reference)?).filter(|value| value.is_finite());
             let [.., luminance] = bias(&image, reference)?;
             readings.push(Reading {
@@ -207,7 +211,8 @@ impl Task<'_> {
                 relmse: relmse(&image, reference)?,
                 mape,
                 bias: luminance.relative,
-                rays,
+                rays: counters.rays as f64 / pixels,
+                not_finite: counters.not_finite(),
             });
             last = Some(image);
         }

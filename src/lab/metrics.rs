@@ -5,7 +5,17 @@ use crate::output::Image;
 
 /// Relative luminance of a linear Rec. 709 colour: 0.2126 R + 0.7152 G + 0.0722 B (ITU-R BT.709, item 3.2).
 pub fn luminance(rgb: [f32; 3]) -> f64 {
-    0.2126 * f64::from(rgb[0]) + 0.7152 * f64::from(rgb[1]) + 0.0722 * f64::from(rgb[2])
+    luminance_of(rgb.map(f64::from))
+}
+
+/// The same in double precision, as means have it.
+fn luminance_of([r, g, b]: [f64; 3]) -> f64 {
+    0.2126 * r + 0.7152 * g + 0.0722 * b
+}
+
+/// The sRGB transfer function (IEC 61966-2-1), linear to encoded, both in [0, 1].
+pub(super) fn srgb_encode(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
 /// Whether two pictures can be compared: of one size, not empty, every value finite.
@@ -113,7 +123,7 @@ pub struct Bias {
 /// As [`check_pair`].
 pub fn bias(image: &Image, reference: &Image) -> Result<[Bias; 4]> {
     check_pair(image, reference)?;
-    let with_luminance = |[r, g, b]: [f64; 3]| [r, g, b, 0.2126 * r + 0.7152 * g + 0.0722 * b];
+    let with_luminance = |[r, g, b]: [f64; 3]| [r, g, b, luminance_of([r, g, b])];
     let (a, b) = (with_luminance(mean(image)), with_luminance(mean(reference)));
     Ok(std::array::from_fn(|i| {
         let absolute = a[i] - b[i];

@@ -2,7 +2,7 @@
 
 use super::experiment::{Axis, Experiment, Metric};
 use super::plot::{self, Curve, Plot};
-use super::results::{self, Mean, Point, Z_95_TWO_SIDED};
+use super::results::{self, EqualTimeRow, Mean, Point, Z_95_TWO_SIDED};
 use super::run::{Findings, Site};
 use super::{settings, strip};
 use crate::error::Result;
@@ -17,12 +17,13 @@ pub(super) fn write(findings: &Findings, folder: &Path) -> Result<Vec<PathBuf>> 
     let table = folder.join(format!("{}.csv", findings.name));
     write_atomic(&table, csv(findings).as_bytes())?;
     files.push(table);
-    let mut page = head(findings);
+    let mut page = head(findings)?;
     for (index, site) in findings.sites.iter().enumerate() {
         let points: Vec<&Point> = findings.points.iter().filter(|point| point.scene == index).collect();
         let suffix = if findings.sites.len() == 1 { String::new() } else { format!("-{}", index + 1) };
         let _ = write!(page, "\n## {}\n\n{}", site.name.replace('*', "N"), noise(site));
         page += &markdown_table(experiment, &points);
+        page += &left_out(experiment, &points);
         for &metric in &experiment.metrics {
             let Some(svg) = plot_of(experiment, site, &points, metric)? else { continue };
             let file = format!("{}{suffix}-{}.svg", findings.name, metric.key());
@@ -41,7 +42,7 @@ pub(super) fn write(findings: &Findings, folder: &Path) -> Result<Vec<PathBuf>> 
     Ok(files)
 }
 
-fn head(findings: &Findings) -> String {
+fn head(findings: &Findings) -> Result<String> {
     let experiment = findings.experiment;
     let mut page = format!("# {}\n\nSource: {}.\n", experiment.title, experiment.source);
     for text in [&experiment.about, &experiment.reading] {
@@ -49,12 +50,14 @@ fn head(findings: &Findings) -> String {
             let _ = write!(page, "\n{}\n", text.trim());
         }
     }
-    let [width, height] = experiment.size;
+    let sizes = experiment.sizes(findings.name)?;
+    let sizes: Vec<String> = sizes.iter().map(|[width, height]| format!("{width} × {height}")).collect();
     let _ = write!(page, "\n```sh\n{}\n```\n\n", findings.command);
     let _ = writeln!(
         page,
-        "{width} × {height} on {}. {} independent runs; ± is 1.96 standard errors of their mean. References: {} frames of \
+        "{} on {}. {} independent runs; ± is 1.96 standard errors of their mean. References: {} frames of \
          `path-tracer` ({}).{}",
+        sizes.join(", "),
         findings.adapter,
         experiment.runs,
         experiment.reference.frames,
@@ -65,7 +68,7 @@ fn head(findings: &Findings) -> String {
             ""
         },
     );
-    page
+    Ok(page)
 }
 
 fn noise(site: &Site) -> String {
@@ -96,25 +99,45 @@ fn with_error(mean: Option<Mean>) -> String {
     }
 }
 
+/// A row of a Markdown table, in whose cells a `|` would begin another.
+fn row(cells: &[String]) -> String {
+    let cell = |text: &String| if text.is_empty() { " |".into() } else { format!(" {} |", text.replace('|', "\\|")) };
+    format!("|{}\n", cells.iter().map(cell).collect::<String>())
+}
+
+/// The first two rows of a Markdown table.
+fn table_head(titles: &[String]) -> String {
+    format!("{}|{}\n", row(titles), "---|".repeat(titles.len()))
+}
+
 /// A table row for each point, and each judged frame where that is the axis.
 fn markdown_table(experiment: &Experiment, points: &[&Point]) -> String {
     let by_frame = points.iter().any(|point| point.frames.len() > 1);
-    let titles: Vec<&str> = experiment.metrics.iter().map(|metric| metric.title()).collect();
-    let frame_head = if by_frame { " frame |" } else { "" };
-    let mut table = format!(
-        "| |{frame_head} {} |\n|---|{}\n",
-        titles.join(" | "),
-        "---|".repeat(titles.len() + usize::from(by_frame))
-    );
+    let cells = |label: String, frame: String, metrics: &dyn Fn(Metric) -> String| -> Vec<String> {
+        let frame = by_frame.then_some(frame);
+        [label].into_iter().chain(frame).chain(experiment.metrics.iter().map(|&metric| metrics(metric))).collect()
+    };
+    let mut table = table_head(&cells(String::new(), "frame".to_owned(), &|metric| metric.title().to_owned()));
     for point in points {
         for &frame in &point.frames {
-            let cells: Vec<String> =
-                experiment.metrics.iter().map(|&metric| with_error(point.mean(metric, frame))).collect();
-            let frame = if by_frame { format!(" {frame} |") } else { String::new() };
-            let _ = writeln!(table, "| {} |{frame} {} |", point.label(experiment), cells.join(" | "));
+            let figures = |metric| with_error(point.mean(metric, frame));
+            table += &row(&cells(point.label(experiment), frame.to_string(), &figures));
         }
     }
     table
+}
+
+/// Which points have pictures that are not whole; nothing where there are none.
+fn left_out(experiment: &Experiment, points: &[&Point]) -> String {
+    let lossy = points.iter().filter_map(|point| {
+        let means = point.frames.iter().filter_map(|&frame| point.mean(Metric::NotFinite, frame));
+        let worst = means.map(|mean| mean.mean).fold(0.0, f64::max);
+        (worst > 0.0).then(|| format!("{} ({})", point.label(experiment), figure(worst)))
+    });
+    match lossy.collect::<Vec<_>>().join("; ") {
+        none if none.is_empty() => none,
+        some => format!("\nSamples that were not finite are left out, of a picture at most and on average: {some}.\n"),
+    }
 }
 
 /// Errors at equal time, for the experiment's first metric that is an error.
@@ -123,18 +146,17 @@ fn equal_time_table(experiment: &Experiment, points: &[&Point]) -> String {
     let Some(&metric) = experiment.metrics.iter().find(|metric| metric.is_error()) else { return String::new() };
     let rows = results::equal_time(experiment, points, metric);
     let mut table = format!(
-        "\nAt equal time: {0} beside that of '{1}' after as many milliseconds, between its frames by powers.\n\n\
-         | | frame | ms | {0} | {1} | ratio |\n|---|---|---|---|---|---|\n",
+        "\nAt equal time: {} beside that of '{}' after as many milliseconds, between its frames by powers.\n\n",
         metric.title(),
         equal.baseline
     );
-    for row in rows {
-        let (baseline, ratio) = match row.baseline {
-            Some(baseline) => (figure(baseline), format!("{:.3}", row.error / baseline)),
+    table += &table_head(&["", "frame", "ms", metric.title(), &equal.baseline, "ratio"].map(str::to_owned));
+    for EqualTimeRow { label, frame, time, error, baseline } in rows {
+        let (baseline, ratio) = match baseline {
+            Some(baseline) => (figure(baseline), format!("{:.3}", error / baseline)),
             None => ("not measured".to_owned(), "–".to_owned()),
         };
-        let (time, error) = (figure(row.time), figure(row.error));
-        let _ = writeln!(table, "| {} | {} | {time} | {error} | {baseline} | {ratio} |", row.label, row.frame);
+        table += &row(&[label, frame.to_string(), figure(time), figure(error), baseline, ratio]);
     }
     table
 }
@@ -242,4 +264,69 @@ fn csv(findings: &Findings) -> String {
 /// A CSV field (RFC 4180).
 fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::measure::{Reading, Run};
+    use super::*;
+
+    const SWEPT: &str = r#"
+title = "Tiny"
+source = "this test"
+size = [24, 16]
+frames = [1]
+runs = 1
+metrics = ["mse", "bias"]
+[[scene]]
+name = "builtin:cornell"
+[[sweep]]
+key = "size"
+values = ["12x8", "48x32"]
+[reference]
+frames = 2
+"#;
+
+    fn experiment() -> Experiment {
+        Experiment::parse("tiny.toml", SWEPT).expect("a sound file")
+    }
+
+    fn point(series: &str, value: &str, not_finite: u64) -> Point {
+        let reading = Reading { frame: 1, mse: 0.5, relmse: 0.5, mape: None, bias: Some(0.01), rays: 3.0, not_finite };
+        let run = Run { frame_ms: 1.0, gpu_ms: None, lighting_ms: None, readings: vec![reading] };
+        let (series, value) = (series.to_owned(), Some(value.to_owned()));
+        Point { scene: 0, series, value, accumulate: false, frames: vec![1], runs: vec![run] }
+    }
+
+    #[test]
+    fn bars_in_labels_begin_no_cells() {
+        let table = markdown_table(&experiment(), &[&point("1/|Z|", "12x8", 0)]);
+        let rows =
+            ["| | MSE | signed bias, % |", "|---|---|---|", "| 1/\\|Z\\|, size = 12x8 | 0.5000 | 1.000 |"].join("\n");
+        assert_eq!(table.trim_end(), rows);
+        let mut several = point("a", "12x8", 0);
+        several.frames = vec![1, 2];
+        let table = markdown_table(&experiment(), &[&several]);
+        assert!(table.starts_with("| | frame | MSE |") && table.contains("| a, size = 12x8 | 1 | 0.5000 |"), "{table}");
+    }
+
+    #[test]
+    fn a_page_states_the_sizes_that_are_swept() {
+        let page = |experiment: &Experiment| {
+            let (adapter, command) = ("a device".to_owned(), "restir lab tiny");
+            let (sites, points) = (Vec::new(), Vec::new());
+            head(&Findings { name: "tiny", experiment, command, adapter, software: false, sites, points })
+        };
+        assert!(page(&experiment()).expect("sizes").contains("\n12 × 8, 48 × 32 on a device. 1 independent"));
+        let alone = Experiment { sweeps: Vec::new(), ..experiment() };
+        assert!(page(&alone).expect("a size").contains("\n24 × 16 on a device. "));
+    }
+
+    #[test]
+    fn pictures_that_are_not_whole_are_named() {
+        let [whole, lossy] = [point("a", "12x8", 0), point("b", "12x8", 7)];
+        assert_eq!(left_out(&experiment(), &[&whole]), "");
+        let said = left_out(&experiment(), &[&whole, &lossy]);
+        assert!(said.contains(": b, size = 12x8 (7.000).") && !said.contains("a, size"), "{said}");
+    }
 }

@@ -51,7 +51,7 @@ pub(super) struct Site {
     pub name: String,
     /// The reference's noise, one a swept scene or size.
     pub noise: Vec<f64>,
-    /// Pictures for the strip, in order: the reference first. Empty where sizes differ.
+    /// Pictures for the strip, in order: for each swept scene or size its reference, then what was measured.
     pub tiles: Vec<(String, PathBuf)>,
 }
 
@@ -70,7 +70,6 @@ pub(super) struct Findings<'a> {
 struct Item<'a> {
     series: &'a Series,
     value: Option<&'a Value>,
-    size: [u32; 2],
 }
 
 /// A scene and a size, and the values of the first sweep that share them: these are measured in turns.
@@ -165,10 +164,8 @@ impl Lab<'_> {
                 progress(&what, done, of);
             })?;
             site.noise.push(reference.noise);
-            let items: Vec<Item> = curves
-                .iter()
-                .flat_map(|series| values.iter().map(move |&value| Item { series, value, size }))
-                .collect();
+            let items: Vec<Item> =
+                curves.iter().flat_map(|series| values.iter().map(move |&value| Item { series, value })).collect();
             let stand = Stand { place, key: &key, camera, reference, size };
             self.group(index, &scene, &mut renderer, &stand, &items, &mut site)?;
         }
@@ -199,14 +196,13 @@ impl Lab<'_> {
         let mut done = 0;
         for number in 0..experiment.runs {
             for (i, item) in items.iter().enumerate() {
-                let accumulate = item.series.accumulate.unwrap_or(experiment.accumulate);
-                let frames = item.series.frames.as_ref().unwrap_or(&experiment.frames);
+                let (accumulate, frames) = (experiment.accumulates(item.series), experiment.frames(item.series));
                 let technique = experiment.technique(item.series);
                 let task = Task {
                     scene: stand.key,
                     camera: &stand.camera,
                     motion: experiment.motion.as_ref(),
-                    size: item.size,
+                    size: stand.size,
                     technique,
                     settings: experiment.settings_of(stand.place, item.series, item.value),
                     accumulate,
@@ -246,7 +242,7 @@ impl Lab<'_> {
                         series: item.series.name.clone(),
                         value: item.value.map(|value| value.0.clone()),
                         accumulate,
-                        frames: frames.clone(),
+                        frames: frames.to_vec(),
                         runs: Vec::new(),
                     });
                     site.tiles.push((found[i].label(experiment), tile));

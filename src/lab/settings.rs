@@ -43,13 +43,15 @@ impl fmt::Display for Value {
 /// Parameters of a technique and of the global groups, by key.
 pub type Settings = BTreeMap<String, Value>;
 
-/// Whether a technique takes all of these.
+/// Whether a technique takes all of these, as [`apply`] will set them.
 ///
 /// # Errors
-/// `UNKNOWN_NAME` for a technique or parameter that does not exist; `BAD_VALUE` for a value that is not taken.
+/// `UNKNOWN_NAME` for a technique or parameter that does not exist; `BAD_VALUE` for a value that is not taken, or not
+/// beside the others.
 pub fn check(technique: &str, settings: &Settings) -> Result<()> {
     let info = techniques::find(technique)?;
-    settings.iter().try_for_each(|(key, value)| info.spec(key)?.parse(&value.0).map(|_| ()))
+    settings.iter().try_for_each(|(key, value)| info.spec(key)?.parse(&value.0).map(|_| ()))?;
+    info.check(settings.iter().map(|(key, value)| (key.as_str(), value.0.as_str())))
 }
 
 /// Sets up a technique with these settings and all others at their defaults.

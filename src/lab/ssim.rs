@@ -1,7 +1,7 @@
 //! Structural similarity (Wang, Bovik, Sheikh and Simoncelli, "Image Quality Assessment: From Error Visibility to
 //! Structural Similarity", 2004).
 
-use super::metrics::{check_pair, luminance};
+use super::metrics::{check_pair, luminance, srgb_encode};
 use super::plane::{Plane, normalised};
 use crate::error::Result;
 use crate::output::Image;
@@ -50,9 +50,4 @@ pub fn ssim(image: &Image, reference: &Image) -> Result<Option<f64>> {
 fn display_luminance(image: &Image) -> Plane {
     let values = image.pixels.iter().map(|&p| srgb_encode(luminance(p).clamp(0.0, 1.0))).collect();
     Plane { width: image.width as usize, height: image.height as usize, values }
-}
-
-/// The sRGB transfer function (IEC 61966-2-1), linear to encoded, both in [0, 1].
-fn srgb_encode(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }

@@ -1,6 +1,6 @@
 //! Strips: the middles of pictures side by side, tone-mapped. What each shows is said beside the strip, not in it.
 
-use super::metrics::luminance;
+use super::metrics::{luminance, srgb_encode};
 use crate::error::{Error, Result};
 use crate::output::{Image, encode_png, write_atomic};
 use std::path::{Path, PathBuf};
@@ -56,9 +56,7 @@ pub fn tile(image: &Image, Exposure(gain): Exposure) -> Tile {
             let pixel = image.pixels[((top + y / scale) * image.width + left + x / scale) as usize];
             let shown = pixel.map(|c| {
                 let linear = 1.0 - (-gain * f64::from(c).max(0.0)).exp();
-                // IEC 61966-2-1.
-                let srgb = if linear <= 0.0031308 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
-                (srgb * 255.0).round() as u8
+                (srgb_encode(linear) * 255.0).round() as u8
             });
             rgba.extend([shown[0], shown[1], shown[2], 255]);
         }
@@ -66,7 +64,7 @@ pub fn tile(image: &Image, Exposure(gain): Exposure) -> Tile {
     Tile { width: width * scale, height: height * scale, rgba }
 }
 
-/// Puts tiles, which are files of one size, into rows and writes them.
+/// Puts tiles, given as files, into rows of cells as large as the largest of them, and writes them.
 ///
 /// # Errors
 /// `IO` and `BAD_FILE` for a tile that cannot be read.

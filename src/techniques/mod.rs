@@ -63,6 +63,23 @@ impl TechniqueInfo {
             }
         })
     }
+
+    /// Refuses settings that contradict each other when they are set one after the other; needs no device. Names that
+    /// are not its own are passed over.
+    ///
+    /// # Errors
+    /// `BAD_VALUE` naming what contradicts what, as [`Technique::set`].
+    pub fn check<'a>(&self, settings: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<()> {
+        // The only one whose parameters can contradict each other.
+        if self.id != restir_di_decoupled::INFO.id {
+            return Ok(());
+        }
+        let mut params = restir_di_decoupled::RestirDiDecoupledParams::default();
+        settings.into_iter().try_for_each(|(name, value)| {
+            params.set(name, value)?;
+            params.check()
+        })
+    }
 }
 
 /// One rendering method. It owns its buffers and records its passes; it knows nothing of windows, pages or other methods.

@@ -261,11 +261,11 @@ impl Technique for RestirDi {
                     .bind("params", &self.uniform)
                     .bind("pass_index", pass_index)
                     .bind("reservoirs", &reservoirs[current])
+                    .bind("reservoirs_previous", &reservoirs[found_in_time])
                     .bind("reservoirs_out", &reservoirs[spare])
                     .dispatch_over(size)?;
-                // What this pass read is free now, unless it is the next frame's history.
-                let free =
-                    if self.params.spatial_feedback == 0 && current == found_in_time { history } else { current };
+                // What this pass read is free now, but for what each iteration reads; the old history is no longer needed.
+                let free = if current == found_in_time { history } else { current };
                 current = spare;
                 spare = free;
             }

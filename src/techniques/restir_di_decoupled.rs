@@ -142,7 +142,7 @@ const BIAS_CORRECTION_NONE: u32 = 0;
 impl RestirDiDecoupledParams {
     /// Refuses settings that contradict each other: the mode that traces every ray for the sake of unbiasedness, and what
     /// would spoil it.
-    fn check(&self) -> Result<()> {
+    pub(super) fn check(&self) -> Result<()> {
         if self.visibility != VISIBILITY_MIS {
             return Ok(());
         }

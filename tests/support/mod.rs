@@ -1,6 +1,7 @@
 //! What the GPU tests share: one device a test binary, scenes in small pictures, and statistics.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+pub mod above;
 pub mod animated;
 pub mod bsdf;
 pub mod extensions;
@@ -10,7 +11,7 @@ pub mod plate;
 pub mod statistics;
 pub mod twins;
 
-use restir::lab::truth::Margins;
+use restir::lab::truth::Proof;
 use restir::{FlatScene, Gpu, GpuOptions, Image, Renderer, Scene};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -28,21 +29,17 @@ pub fn fresh_gpu() -> Gpu {
         .expect("a Vulkan driver (Debian: mesa-vulkan-drivers)")
 }
 
-/// Whether statistical proofs are made in full, as `npm run prove` does. `npm test` makes a quarter of the runs, which doubles errors,
-/// and allows twice the margin.
-pub fn is_whole() -> bool {
-    std::env::var_os("RESTIR_PROVE").is_some()
+/// How thoroughly statistical proofs are made: wholly for `npm run prove`, quickly else.
+pub fn proof() -> Proof {
+    if std::env::var_os("RESTIR_PROVE").is_some() { Proof::Whole } else { Proof::Quick }
 }
 
-/// So many runs, or frames, of a proof in full; a quarter of them else.
-pub fn effort(count: u32) -> u32 {
-    if is_whole() { count } else { count.div_ceil(4) }
-}
-
-/// These margins of a proof in full; twice as wide else.
-pub fn margins(whole: Margins) -> Margins {
-    let factor = if is_whole() { 1.0 } else { 2.0 };
-    Margins { picture: factor * whole.picture, tile: factor * whole.tile }
+/// All cases of a proof; of a quick one the first.
+pub fn cases<T>(all: &[T]) -> &[T] {
+    match proof() {
+        Proof::Whole => all,
+        Proof::Quick => all.get(..1).unwrap_or_default(),
+    }
 }
 
 /// Says that a test does not run, and why.

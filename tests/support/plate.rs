@@ -45,6 +45,12 @@ pub fn scattered(brdf: &Brdf, angle: f64, wi: DVec3) -> DVec3 {
     brdf.value(DVec3::new(angle.sin(), 0.0, angle.cos()), local(wi)) * wi.y
 }
 
+/// Frames of a run. Runs are added until the standard error is so much of the mean, which says nothing about where the mean lies.
+const FRAMES: u32 = 8;
+const SHARP: f64 = 0.001;
+const FEWEST: usize = 16;
+const MOST: usize = 96;
+
 /// The mean picture of either technique is `expected`, channel by channel.
 pub fn check(scene: &Scene, expected: DVec3, what: &str) {
     check_by(&["path-tracer", "restir-di"], scene, &[], expected, what);
@@ -59,18 +65,21 @@ pub fn check_by(techniques: &[&str], scene: &Scene, settings: &[(&str, &str)], e
         if technique == "restir-di" {
             renderer.set("indirect", "no").expect("a setting");
         }
-        let runs: Vec<DVec3> = (0..24)
-            .map(|seed| {
-                renderer.set_seed(seed);
-                let image = render(&mut renderer, 32);
-                let sum: DVec3 = image.pixels.iter().map(|p| Vec3::from(*p).as_dvec3()).sum();
-                sum / image.pixels.len() as f64
-            })
-            .collect();
-        let n = runs.len() as f64;
-        let mean = runs.iter().sum::<DVec3>() / n;
-        let variance = runs.iter().map(|r| (*r - mean) * (*r - mean)).sum::<DVec3>() / (n * (n - 1.0));
-        let error = DVec3::new(variance.x.sqrt(), variance.y.sqrt(), variance.z.sqrt());
+        let mut runs: Vec<DVec3> = Vec::new();
+        let (mean, error) = loop {
+            renderer.set_seed(runs.len() as u32);
+            let image = render(&mut renderer, FRAMES);
+            let sum: DVec3 = image.pixels.iter().map(|p| Vec3::from(*p).as_dvec3()).sum();
+            runs.push(sum / image.pixels.len() as f64);
+            let n = runs.len() as f64;
+            let mean = runs.iter().sum::<DVec3>() / n;
+            let variance = runs.iter().map(|r| (*r - mean) * (*r - mean)).sum::<DVec3>() / (n * (n - 1.0));
+            let error = variance.map(f64::sqrt);
+            let is_sharp = (error / expected).max_element() < SHARP;
+            if runs.len() >= FEWEST && is_sharp || runs.len() >= MOST {
+                break (mean, error);
+            }
+        };
         println!("{what}, {technique}: {mean:.5} ± {error:.5}, expected {expected:.5}");
         for channel in 0..3 {
             let distance = (mean[channel] - expected[channel]).abs();

@@ -21,8 +21,6 @@ override reuse_valid: bool = false; // 1/|Z|
 override reuse_pairwise: bool = false;
 override reuse_defensive: bool = false; // with reuse_pairwise
 override reuse_visibility: bool = false;
-// Whether what a reservoir holds is known to be lit where it is held: no shadow ray is traced for that.
-override reservoirs_are_visible: bool = false;
 
 const MAXIMUM_DOMAINS = 17u;
 
@@ -96,7 +94,8 @@ fn combination_value(surface: Surface, j: u32, previous: bool) {
     }
     for (var n = 0u; n < count; n += 1u) {
         let i = n * stride;
-        if domain_reservoirs[i].unbiased_contribution_weight <= 0.0 {
+        // What counts nothing for the canonical domain needs no weight.
+        if domain_reservoirs[i].unbiased_contribution_weight <= 0.0 || (j > 0u && canonical_targets[i] <= 0.0) {
             continue;
         }
         let value = domain_target(surface, reservoir_sample(domain_reservoirs[i]), i == j, previous);

@@ -13,17 +13,11 @@ fn previous_pixel_has_surface(pixel: vec2u) -> bool {
     return textureLoad(previous_visibility, pixel, 0).x != NONE;
 }
 
-// The surface of a pixel of this frame, or of the previous one as it was then; triangles are numbered for their frame,
-// instances are those of this one. One function for both, for each call is inlined.
-fn load_pixel_of(pixel: vec2u, previous: bool) -> Surface {
-    var seen = textureLoad(visibility, pixel, 0);
-    var camera = frame.camera;
-    if previous {
-        seen = textureLoad(previous_visibility, pixel, 0);
-        seen.x = previous_instance(seen.x);
-        camera = frame.previous_camera;
-    }
-    return load_seen(camera, seen.x, seen.y, bitcast<vec2f>(seen.zw));
+// The surface that a pixel saw in the previous frame, as it was then: triangles are numbered for their frame, instances are those
+// of this one.
+fn load_previous_pixel(pixel: vec2u) -> Surface {
+    let seen = textureLoad(previous_visibility, pixel, 0);
+    return load_seen(frame.previous_camera, previous_instance(seen.x), seen.y, bitcast<vec2f>(seen.zw));
 }
 
 // How deep in the previous frame's picture a point was.

@@ -2,6 +2,10 @@
 // with probability proportional to its resampling weight.
 #include "scene/lights.wgsl"
 
+// Whether what a reservoir holds is known to be lit where it is held, fixed when a pipeline is made (src/techniques/reuse.rs): no
+// shadow ray is traced for that.
+override reservoirs_are_visible: bool = false;
+
 // What a surface scatters of light from a direction: a dispersing one each colour by its own index of refraction, as a path
 // that has chosen its colour sees it.
 fn direct_scatter(surface: Surface, wi: vec3f, distance: f32) -> vec3f {
@@ -73,7 +77,10 @@ fn shade_reservoir(surface: Surface, reservoir: Reservoir) -> vec3f {
     let sample = reservoir_sample(reservoir);
     let light = light_contribution(sample, surface.position, false);
     let unshadowed = direct_scatter(surface, light.direction, light.distance) * light.value;
-    if luminance(unshadowed) <= 0.0 || !is_visible(surface, light.direction, light.distance) {
+    if luminance(unshadowed) <= 0.0 {
+        return vec3f(0.0);
+    }
+    if !reservoirs_are_visible && !is_visible(surface, light.direction, light.distance) {
         return vec3f(0.0);
     }
     return unshadowed * reservoir.unbiased_contribution_weight;

@@ -78,7 +78,7 @@ fn select_domains(pixel: vec2u, surface: Surface, selection: ptr<function, Selec
             continue;
         }
         // The second half is for filling a disocclusion.
-        if i > tries && (temporal != NONE || params.fill_disocclusions == 0u) {
+        if i > tries && (temporal != NONE || params.temporal_reuse == 0u || params.fill_disocclusions == 0u) {
             break;
         }
         if i > 0u && i <= tries && spatiotemporal != NONE {
@@ -94,6 +94,9 @@ fn select_domains(pixel: vec2u, surface: Surface, selection: ptr<function, Selec
         }
         let candidate = vec2u(place);
         if i > 0u && is_seen && all(candidate == center) {
+            continue;
+        }
+        if spatiotemporal != NONE && all(candidate == domain_pixel(spatiotemporal)) {
             continue;
         }
         if !is_similar(surface, depth, domains_previous[pixel_index(candidate)]) {

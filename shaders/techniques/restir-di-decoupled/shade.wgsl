@@ -105,8 +105,10 @@ fn gather_sample(selection: Selection, i: u32) -> Sample {
 
 // p-hat_j(x) of a pixel of the previous frame, with the light as it was then.
 fn domain_target(domain: Domain, light: ResolvedLight) -> f32 {
-    if scene_has_motion {
-        let before = light_contribution(tile_light_sample(light.packed), domain.position, true);
+    let sample = tile_light_sample(light.packed);
+    // The sky and the sun may turn where nothing else moves.
+    if scene_has_motion || lights[sample.light].kind >= LIGHT_ENVIRONMENT {
+        let before = light_contribution(sample, domain.position, true);
         return luminance(before.value) * approximate_scatter(domain, before.direction);
     }
     let incidence = tile_incidence(light.packed, domain.position);

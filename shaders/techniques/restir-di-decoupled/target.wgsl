@@ -6,17 +6,19 @@
 
 // Lobes that `approximate_scatter` knows nothing of.
 fn has_other_lobes() -> bool {
-    return scene_has_transmission || scene_has_volumes || scene_has_sheen || scene_has_clearcoat || scene_has_anisotropy;
+    return scene_has_volumes || scene_has_sheen || scene_has_clearcoat || scene_has_anisotropy;
 }
 
 // About the luminance of f |cos|: a GGX reflection over a Lambertian one, without colours.
 fn approximate_scatter(domain: Domain, wi: vec3f) -> f32 {
     var cos_i = dot(domain.normal, wi);
-    if scene_has_transmission {
-        // Light from below counts too.
-        cos_i = max(abs(cos_i), 1e-3);
-    } else if cos_i <= 0.0 || dot(domain.geometric_normal, wi) <= 0.0 {
+    // As `surface_evaluate`: nothing where the two normals do not agree on the side.
+    let is_above = dot(domain.geometric_normal, wi) > 0.0;
+    if domain.is_black || is_above != (cos_i > 0.0) || (!is_above && !domain.transmits) {
         return 0.0;
+    }
+    if scene_has_transmission {
+        cos_i = max(abs(cos_i), 1e-3);
     }
     let cos_o = max(dot(domain.normal, domain.wo), 1e-3);
     let alpha_2 = square(domain.alpha);
@@ -35,9 +37,10 @@ fn approximate_scatter(domain: Domain, wi: vec3f) -> f32 {
     return cos_i * ((1.0 - domain.metallic) * domain.albedo / PI + 1e-5 + fresnel * distribution * masking);
 }
 
-// The same for what a pixel sees now, whose whole material is at hand: other lobes are evaluated in full.
+// The same for what a pixel sees now, whose whole material is at hand: other lobes are evaluated in full. Not so where light
+// comes through: which directions cannot be refracted is more than the next frame will know of this domain.
 fn pixel_scatter(surface: Surface, domain: Domain, wi: vec3f, distance: f32) -> f32 {
-    if has_other_lobes() {
+    if has_other_lobes() && !domain.transmits {
         return luminance(direct_scatter(surface, wi, distance));
     }
     return approximate_scatter(domain, wi);

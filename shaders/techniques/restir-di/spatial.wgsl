@@ -1,6 +1,7 @@
 // Spatial reuse: reservoirs of random pixels within a radius join the pixel's own.
-// One invocation: one pixel. Reads the visibility buffer and the reservoirs of the pass before. Writes the combined
-// reservoirs. Run once an iteration, `pass_index.value` counting from 0.
+// One invocation: one pixel. Reads the visibility buffer, the scene, the reservoirs of the pass before and, for their confidence
+// weights, those that reuse in time left (`reservoirs_previous`). Writes the combined reservoirs and counts rays. Run once an
+// iteration, `pass_index.value` counting from 0.
 // Source: Bitterli et al. 2020, Algorithm 5, lines 13 to 19; thesis 001, section 5.4 (depth and normal thresholds); thesis
 // 000, section 4.5.4 (retries); Wyman and Panteleev 2021, section 6.4 (more neighbours without history).
 #include "scene/visibility_buffer.wgsl"
@@ -51,7 +52,8 @@ fn reuse_pixel(pixel: vec2u) {
         keep(pixel);
         return;
     }
-    let confidence_weight = load_reservoir(pixel, 0u).confidence_weight;
+    // The pixel's own, however many neighbours earlier iterations have joined.
+    let confidence_weight = load_previous_reservoir(pixel, 0u).confidence_weight;
     if confidence_weight >= params.spatial_confidence_limit {
         keep(pixel);
         return;

@@ -82,13 +82,11 @@ fn reuse_pixel(pixel: vec2u) {
         return;
     }
     let previous_pixel = vec2u(reprojected);
-    let seen = textureLoad(previous_visibility, previous_pixel, 0);
-    if seen.x == NONE {
+    if !previous_pixel_has_surface(previous_pixel) {
         keep(pixel);
         return;
     }
-    // Triangles are numbered for their frame, instances are those of this one.
-    let previous = load_seen(frame.previous_camera, previous_instance(seen.x), seen.y, bitcast<vec2f>(seen.zw));
+    let previous = load_previous_pixel(previous_pixel);
     if !reuse_everything && !is_same_surface(surface, position, previous) {
         keep(pixel);
         return;

@@ -42,18 +42,16 @@ fn reuse_pixel(pixel: vec2u) {
         position = previous_position(pixel);
         film = project(frame.previous_camera, position);
     }
-    if any(film < vec2f(0.0)) || any(film >= vec2f(frame.size)) {
+    if !is_on_film(film) {
         keep(pixel);
         return;
     }
     let previous_pixel = vec2u(film);
-    let seen = textureLoad(previous_visibility, previous_pixel, 0);
-    if seen.x == NONE {
+    if !previous_pixel_has_surface(previous_pixel) {
         keep(pixel);
         return;
     }
-    // Triangles are numbered for their frame, instances are those of this one.
-    let previous = load_seen(frame.previous_camera, previous_instance(seen.x), seen.y, bitcast<vec2f>(seen.zw));
+    let previous = load_previous_pixel(previous_pixel);
     if params.fault_no_reprojection == 0u && !is_similar(surface, position, previous, frame.previous_camera) {
         keep(pixel);
         return;

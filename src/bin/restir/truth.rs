@@ -3,7 +3,7 @@
 use crate::failure::{Failure, Result};
 use crate::{lab, progress, report};
 use pollster::block_on;
-use restir::lab::truth::{self, Finding, Step, Trial, Verdict};
+use restir::lab::truth::{self, Finding, Proof, Step, Trial, Verdict};
 use restir::{Error, Gpu, GpuOptions};
 
 /// Prove what techniques claim: settings said to be unbiased have the path tracer's expectation, biased ones have their
@@ -26,12 +26,13 @@ pub fn run(args: &Args) -> Result<()> {
         Some(id) => vec![Trial::find(id).map_err(Failure::from_option)?],
         None => Trial::techniques().map(Trial::find).collect::<restir::Result<_>>()?,
     };
+    let proof = if args.quick { Proof::Quick } else { Proof::Whole };
     let mut findings = Vec::new();
     for trial in &trials {
         let scene = lab::load(&trial.scene)?;
         let device = || block_on(Gpu::headless(&GpuOptions { default_limits: false }));
         let bar = progress::bar(0);
-        let found = truth::check(trial, args.quick, &scene, &device, &|what, done, of| {
+        let found = truth::check(trial, proof, &scene, &device, &|what, done, of| {
             bar.set_length(of as u64);
             bar.set_position(done as u64);
             bar.set_message(what.to_owned());
@@ -64,5 +65,10 @@ fn line(finding: &Finding) -> String {
         (Step::Plant, _) => ("planted", "unnoticed"),
     };
     let (bias, error) = (100.0 * finding.bias, 100.0 * finding.standard_error);
-    format!("{mark} {:12} {step:8} {bias:+8.3} ± {error:.3} %  {verdict:10} {}", finding.technique, finding.what)
+    let left_out = match finding.not_finite {
+        0 => String::new(),
+        samples => format!("; samples not finite: {samples}"),
+    };
+    let Finding { technique, what, .. } = finding;
+    format!("{mark} {technique:12} {step:8} {bias:+8.3} ± {error:.3} %  {verdict:10} {what}{left_out}")
 }

@@ -46,12 +46,24 @@ impl Estimate {
 /// # Errors
 /// Those of rendering.
 pub fn pictures(renderer: &mut Renderer, runs: u32, frames: u32) -> Result<Vec<Image>> {
+    Ok(counted_pictures(renderer, runs, frames)?.0)
+}
+
+/// The same, and how many samples the film left out of them because they were not finite. Where there are any, the
+/// pictures' mean is that of the other samples.
+///
+/// # Errors
+/// Those of rendering.
+pub fn counted_pictures(renderer: &mut Renderer, runs: u32, frames: u32) -> Result<(Vec<Image>, u64)> {
+    let mut not_finite = 0;
     let mut run = |number| {
         renderer.set_seed(FIRST_SEED + number);
         (0..frames).try_for_each(|_| renderer.render_frame())?;
+        not_finite += block_on(renderer.counters())?.not_finite();
         block_on(renderer.read_image())
     };
-    (0..runs).map(&mut run).collect()
+    let pictures = (0..runs).map(&mut run).collect::<Result<_>>()?;
+    Ok((pictures, not_finite))
 }
 
 /// Mean radiance of the picture, then of each of its square tiles, `tile` pixels wide.
@@ -65,6 +77,33 @@ pub fn region_means(image: &Image, tile: u32) -> Vec<f64> {
         sums[1 + (y * columns + x) as usize] += value / f64::from(tile * tile);
     }
     sums
+}
+
+/// How thoroughly an equivalence is proved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Proof {
+    /// With all its runs.
+    Whole,
+    /// With a quarter of them. That doubles the errors, and twice the margin is all that can be asked then.
+    Quick,
+}
+
+impl Proof {
+    /// So many runs, or frames, of a whole proof, or a quarter of them.
+    pub fn effort(self, whole: u32) -> u32 {
+        match self {
+            Proof::Whole => whole,
+            Proof::Quick => whole.div_ceil(4),
+        }
+    }
+
+    /// These margins of a whole proof, or twice as wide.
+    pub fn margins(self, whole: Margins) -> Margins {
+        match self {
+            Proof::Whole => whole,
+            Proof::Quick => Margins { picture: 2.0 * whole.picture, tile: 2.0 * whole.tile },
+        }
+    }
 }
 
 /// How much an expectation may be off, relative to it.

@@ -4,5 +4,5 @@
 pub mod equivalence;
 mod trial;
 
-pub use equivalence::{Comparison, Estimate, Margins};
+pub use equivalence::{Comparison, Estimate, Margins, Proof};
 pub use trial::{Claim, Finding, Plant, Step, Trial, Verdict, check};

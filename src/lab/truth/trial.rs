@@ -1,6 +1,6 @@
 //! What a technique claims, as its file `lab/truth/TECHNIQUE.toml` declares it, and the proof.
 
-use super::equivalence::{Comparison, Estimate, Margins};
+use super::equivalence::{Comparison, Estimate, Margins, Proof, counted_pictures};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::lab::settings::{self, Settings, View};
@@ -13,9 +13,6 @@ static FILES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/claims.rs"))
 
 /// How far an unbiased setting may be off: docs/testing.md.
 const MARGINS: Margins = Margins { picture: 0.002, tile: 0.01 };
-
-/// A quick check makes this share of the runs, which widens errors to twice what they were, and margins with them.
-const QUICK: u32 = 4;
 
 /// The claims of one technique, and how they are put to the proof.
 #[derive(Debug, Clone, Deserialize)]
@@ -129,9 +126,11 @@ pub struct Finding {
     pub bias: f64,
     /// Its standard error.
     pub standard_error: f64,
+    /// Samples that were not finite, and so are in no mean.
+    pub not_finite: u64,
     /// What the numbers say.
     pub verdict: Verdict,
-    /// Whether that is as it should be.
+    /// Whether that is as it should be: where no bias is claimed, with every sample.
     pub passed: bool,
     /// Relative difference, standard error and margin of the picture, then of each tile.
     pub regions: Comparison,
@@ -178,7 +177,8 @@ impl Trial {
             return bad("tiles do not fill the picture");
         }
         for effort in [trial.reference, trial.unbiased, trial.biased] {
-            if effort.runs < 2 * QUICK || effort.frames == 0 {
+            // Two are left of a quick proof, the fewest that have a variance.
+            if effort.runs < 8 || effort.frames == 0 {
                 return bad("8 runs and 1 frame are the fewest");
             }
         }
@@ -187,6 +187,15 @@ impl Trial {
             settings::check(&trial.technique, &trial.settings_with(own))?;
         }
         Ok(trial)
+    }
+
+    /// Of each kind the first alone: a setting that is unbiased, one that is biased, a plant.
+    #[must_use]
+    pub fn abridged(mut self) -> Self {
+        let first = |unbiased| self.claims.iter().find(|claim| claim.unbiased == unbiased).cloned();
+        self.claims = [first(true), first(false)].into_iter().flatten().collect();
+        self.plants.truncate(1);
+        self
     }
 
     fn settings_with(&self, own: &Settings) -> Settings {
@@ -207,39 +216,44 @@ impl Trial {
 /// Puts all claims of a trial to the proof, one after the other, then all plants. `device` makes devices: one for the
 /// claims and one for each plant. `heard` is told what comes next, how many are done and how many there are.
 ///
-/// A quick check makes a quarter of the runs for unbiased settings and asks of them no more than it can tell: twice the margin.
+/// A quick proof is one of unbiased settings alone: what is biased must be seen beyond the same margins, with as many runs.
 ///
 /// # Errors
-/// Those of rendering; `SHADER` for a plant whose text is no longer in the shaders.
+/// Those of rendering; `SHADER` for a plant whose text is no longer in the shaders; `BAD_VALUE` where the reference has
+/// samples that are not finite, for then it is none.
 pub fn check(
     trial: &Trial,
-    quick: bool,
+    proof: Proof,
     scene: &FlatScene,
     device: &dyn Fn() -> Result<Gpu>,
     heard: &dyn Fn(&str, usize, usize),
 ) -> Result<Vec<Finding>> {
-    let wide = Margins { picture: 2.0 * MARGINS.picture, tile: 2.0 * MARGINS.tile };
     let of = 1 + trial.claims.len() + trial.plants.len();
-    let less = |effort: Effort| if quick { Effort { runs: effort.runs / QUICK, ..effort } } else { effort };
-    let estimate =
-        |renderer: &mut Renderer, effort: Effort| Estimate::radiance(renderer, effort.runs, effort.frames, trial.tile);
+    let less = |effort: Effort| Effort { runs: proof.effort(effort.runs), ..effort };
+    let estimate = |renderer: &mut Renderer, effort: Effort| {
+        let (pictures, not_finite) = counted_pictures(renderer, effort.runs, effort.frames)?;
+        Ok::<_, Error>((Estimate::of_pictures(&pictures, trial.tile), not_finite))
+    };
     heard("reference", 0, of);
     let gpu = device()?;
     let mut renderer = trial.renderer(gpu, scene)?;
     settings::apply(&mut renderer, "path-tracer", &trial.render)?;
-    let reference = estimate(&mut renderer, less(trial.reference))?;
+    let (reference, not_finite) = estimate(&mut renderer, less(trial.reference))?;
+    if not_finite > 0 {
+        return Err(Error::bad_value("reference", format!("{not_finite} samples are not finite")));
+    }
     let mut findings = Vec::new();
     for claim in &trial.claims {
         let what = claim.what();
         heard(&what, 1 + findings.len(), of);
         settings::apply(&mut renderer, &trial.technique, &trial.settings_with(&claim.settings))?;
         let (step, effort, margins) = match claim.unbiased {
-            true if quick => (Step::Unbiased, less(trial.unbiased), wide),
-            true => (Step::Unbiased, trial.unbiased, MARGINS),
+            true => (Step::Unbiased, less(trial.unbiased), proof.margins(MARGINS)),
             false => (Step::Biased, trial.biased, MARGINS),
         };
-        let regions = Comparison::new(&estimate(&mut renderer, effort)?, &reference, margins);
-        findings.push(Finding::new(&trial.technique, step, what, regions));
+        let (estimate, not_finite) = estimate(&mut renderer, effort)?;
+        let regions = Comparison::new(&estimate, &reference, margins);
+        findings.push(Finding::new(&trial.technique, step, what, regions, not_finite));
     }
     for plant in &trial.plants {
         heard(&plant.what, 1 + findings.len(), of);
@@ -247,24 +261,44 @@ pub fn check(
         gpu.plant(&plant.old, &plant.new)?;
         let mut renderer = trial.renderer(gpu, scene)?;
         settings::apply(&mut renderer, &trial.technique, &trial.settings_with(&plant.settings))?;
-        let regions = Comparison::new(&estimate(&mut renderer, trial.biased)?, &reference, MARGINS);
-        findings.push(Finding::new(&trial.technique, Step::Plant, plant.what.clone(), regions));
+        let (estimate, not_finite) = estimate(&mut renderer, trial.biased)?;
+        let regions = Comparison::new(&estimate, &reference, MARGINS);
+        findings.push(Finding::new(&trial.technique, Step::Plant, plant.what.clone(), regions, not_finite));
     }
     Ok(findings)
 }
 
 impl Finding {
-    fn new(technique: &str, step: Step, what: String, regions: Comparison) -> Self {
+    fn new(technique: &str, step: Step, what: String, regions: Comparison, not_finite: u64) -> Self {
         let verdict = match (regions.is_equivalent(), regions.is_caught()) {
             (true, _) => Verdict::Equivalent,
             (_, true) => Verdict::Biased,
             _ => Verdict::Undecided,
         };
         let passed = match step {
-            Step::Unbiased => verdict == Verdict::Equivalent,
+            // What is left out may be what would have made the mean wrong.
+            Step::Unbiased => verdict == Verdict::Equivalent && not_finite == 0,
             Step::Biased | Step::Plant => verdict == Verdict::Biased,
         };
         let (bias, standard_error) = regions.bias();
-        Finding { technique: technique.to_owned(), step, what, bias, standard_error, verdict, passed, regions }
+        let technique = technique.to_owned();
+        Finding { technique, step, what, bias, standard_error, not_finite, verdict, passed, regions }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_claim_holds_only_with_all_its_samples() {
+        let passed = |step, mean, not_finite| {
+            let [estimate, reference] = [mean, 1.0].map(|mean| Estimate(vec![(mean, 1e-4)]));
+            let regions = Comparison::new(&estimate, &reference, MARGINS);
+            Finding::new("ris", step, String::new(), regions, not_finite).passed
+        };
+        assert!(passed(Step::Unbiased, 1.0, 0) && !passed(Step::Unbiased, 1.0, 1) && !passed(Step::Unbiased, 1.1, 0));
+        // A fault may well make them.
+        assert!(passed(Step::Plant, 1.1, 1) && passed(Step::Biased, 1.1, 1) && !passed(Step::Plant, 1.0, 1));
     }
 }
