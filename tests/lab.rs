@@ -191,7 +191,7 @@ fn contradictory_settings_are_refused() {
     };
     for (settings, values) in [
         ("visibility = \"mis\", checkerboard = true", ""),
-        ("visibility = \"mis\", visibility_reuse_radius = 15", ""),
+        ("visibility = \"mis\", bias_correction = \"none\"", ""),
         ("checkerboard = true", "\"decoupled\", \"mis\""),
     ] {
         let error = parse(settings, values).expect_err(settings);

@@ -42,3 +42,17 @@ fn reuse_divides_the_error_by_four_and_more() {
     // History must be part of it.
     assert!(reused < first, "history did not help");
 }
+
+/// Pixels without history join neighbours in each iteration, not in the first alone: their confidence weight is that of all.
+#[test]
+fn every_iteration_joins_neighbours() {
+    let confidence = |iterations: &str| {
+        let settings = [SETTINGS, REUSE, &[("spatial_iterations", iterations)]].concat();
+        let mut renderer = renderer(&gpu(), builtin("cornell"), SIZE, "restir-di", &settings);
+        renderer.set_view("confidence weight").expect("a view");
+        mean(&render(&mut renderer, 1))
+    };
+    let (one, two, three) = (confidence("1"), confidence("2"), confidence("3"));
+    println!("confidence weights as shown: {one:.4}, {two:.4}, {three:.4}");
+    assert!(two > 1.5 * one && three > 1.5 * two, "{one} {two} {three}");
+}

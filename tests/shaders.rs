@@ -226,6 +226,23 @@ fn enumeration(prefix: &str) -> BTreeMap<String, usize> {
     found
 }
 
+/// Arrays of shaders hold as many as parameters allow.
+#[test]
+fn shaders_have_room_for_what_parameters_allow() {
+    let most = |technique, name: &str| {
+        let specs = techniques::find(technique).expect("a technique").params;
+        match specs.iter().find(|spec| spec.name == name).map(|spec| spec.kind) {
+            Some(ParamKind::Uint { max, .. }) => max as usize,
+            _ => panic!("{technique} has no number {name}"),
+        }
+    };
+    let room = enumeration("MAXIMUM_");
+    // The pixel's own reservoir is one of them.
+    assert_eq!(room["DOMAINS"], 1 + most("restir-di", "spatial_neighbors"));
+    assert_eq!(room["DOMAINS"], 1 + most("restir-di", "disocclusion_neighbors"));
+    assert_eq!(room["STREAMS"], most("ris", "samples"));
+}
+
 /// A uniform holds the index of a choice, so shaders must count choices as they are declared.
 #[test]
 fn shaders_number_choices_as_declared() {

@@ -148,7 +148,6 @@ impl RestirDiDecoupledParams {
         }
         let contradiction = [
             (self.bias_correction == BIAS_CORRECTION_NONE, "bias_correction = none, whose weights take no rays"),
-            (self.visibility_reuse_radius > 0.0, "visibility_reuse_radius above 0, which saves rays"),
             (self.checkerboard == 1, "checkerboard = true, which saves rays"),
         ];
         match contradiction.into_iter().find(|(holds, _)| *holds) {
@@ -273,7 +272,7 @@ impl Technique for RestirDiDecoupled {
                 .dispatch_over(traced)?;
         }
         if self.params.indirect == 1 {
-            recorder.pass(&table::RESTIR_DI_INDIRECT).bind("indirect_out", &buffers.indirect).dispatch_over(size)?;
+            recorder.pass(&table::COMMON_INDIRECT).bind("indirect_out", &buffers.indirect).dispatch_over(size)?;
         }
         recorder
             .pass(&table::RESTIR_DI_DECOUPLED_SHADE)

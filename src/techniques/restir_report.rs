@@ -167,7 +167,7 @@ impl Technique for RestirReport {
             current = spare;
         }
         if self.params.indirect == 1 {
-            recorder.pass(&table::RESTIR_DI_INDIRECT).bind("indirect_out", &buffers.indirect).dispatch_over(size)?;
+            recorder.pass(&table::COMMON_INDIRECT).bind("indirect_out", &buffers.indirect).dispatch_over(size)?;
         }
         recorder
             .pass(&table::RESTIR_REPORT_SHADE)

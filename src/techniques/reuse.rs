@@ -1,14 +1,10 @@
-//! Reuse weights: how reservoirs of several pixels are joined (`shaders/techniques/common/combine.wgsl`), for every
-//! technique that joins them.
+//! Reuse weights: how passes that include `shaders/techniques/common/combine.wgsl` join reservoirs of several pixels.
 
 use crate::error::{Error, Result};
 use crate::gpu::shader::SceneFeatures;
 
 /// The choices of a parameter `reuse_weights`, from the least to the most careful.
 pub const WEIGHTS: [&str; 6] = ["constant", "heuristics", "1/z", "balance", "pairwise", "defensive"];
-
-/// Most reservoirs that can be joined at once, the pixel's own included; `MAXIMUM_DOMAINS` in the shader.
-pub const MAXIMUM_DOMAINS: u32 = 17;
 
 /// Puts into `features` what passes that include `techniques/common/combine.wgsl` are compiled with: which of
 /// [`WEIGHTS`], whether visibility is a factor of target functions in them, and whether every reservoir that they join

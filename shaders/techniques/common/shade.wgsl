@@ -1,4 +1,4 @@
-// What passes that end a frame have in common: the later bounces that restir-di/indirect has traced, and colours for views.
+// What passes that end a frame have in common: the later bounces that common/indirect has traced, and colours for views.
 #include "lib/rng.wgsl"
 #include "scene/bindings.wgsl"
 

@@ -1,6 +1,6 @@
 // Kernel 2: shadow rays, and nothing else that is expensive.
-// One invocation: one pixel. Reads the selections, the previous frame's reservoirs and the scene. Writes the visibility of
-// the pixel's three samples into its selection.
+// One invocation: one pixel. Reads both visibility buffers, the selections, the previous frame's reservoirs and the scene.
+// Writes the visibility of the pixel's three samples into its selection and counts rays.
 // Source: Wyman and Panteleev 2021, section 7.2 and Fig. 15 (what is traced), section 7.3 (what is reused), section 4.6
 // (rays in the weights).
 #include "scene/counters.wgsl"

@@ -1,6 +1,7 @@
-// Shading: each reservoir's sample, with a shadow ray of its own, plus what the surface emits and the indirect light.
-// One invocation: one pixel. Reads the visibility buffer, the final reservoirs and the indirect radiance. Writes
-// radiance, or a debug view.
+// Shading: each reservoir's sample, plus what the surface emits and the indirect light. A shadow ray goes to the sample where it
+// is not known to be lit.
+// One invocation: one pixel. Reads the visibility buffer, the scene, the final reservoirs and the indirect radiance. Writes
+// radiance, or a debug view, and counts rays.
 // Source: Bitterli et al. 2020, Algorithm 5, lines 20 to 22; thesis 001, section 5.5 (several slots are averaged).
 #include "techniques/common/shade.wgsl"
 #include "scene/visibility_buffer.wgsl"

@@ -1,6 +1,6 @@
 // Temporal reuse: the reservoir of the same surface point in the previous frame joins this frame's.
-// One invocation: one pixel. Reads both visibility buffers, this frame's initial reservoirs and the previous frame's
-// final ones. Writes the combined reservoirs.
+// One invocation: one pixel. Reads both visibility buffers, the scene, this frame's initial reservoirs and the previous frame's
+// final ones. Writes the combined reservoirs and counts rays.
 // What the previous frame's pixel saw is rebuilt and its shadow rays are traced in the scene as it was then: transforms,
 // shapes, lights with their power, and BVH of one frame are kept. So reuse stays unbiased whatever moves or is switched.
 // Source: Bitterli et al. 2020, Algorithm 5, lines 8 to 12; thesis 001, section 5.3.1 (rejection by position, normal and

@@ -32,7 +32,7 @@ fn report_sample(reservoir: ReportReservoir) -> LightSample {
 }
 
 // A reservoir once everything has been offered to its stream: Weight = WeightSum / (Pdf * SamplesCount) (section 4.3).
-// Where nothing was selected all three are 0. `fault_unguarded_pdf` divides all the same.
+// Where nothing was selected Weight and Pdf are 0. `fault_unguarded_pdf` divides all the same.
 fn finish_reservoir(stream: Stream, desired_pdf: f32, samples_count: f32) -> ReportReservoir {
     var weight = stream.weight_sum / (desired_pdf * samples_count);
     if params.fault_unguarded_pdf == 0u {

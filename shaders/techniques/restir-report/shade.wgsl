@@ -1,6 +1,6 @@
 // Shading: the sample of each reservoir with a shadow ray of its own, plus what the surface emits and the indirect light.
-// One invocation: one pixel. Reads the visibility buffer, the final reservoirs and the indirect radiance. Writes radiance, or
-// a debug view.
+// One invocation: one pixel. Reads the visibility buffer, the scene, the final reservoirs and the indirect radiance. Writes
+// radiance, or a debug view, and counts rays.
 // Source: report 003, sections 4.3 and 4.4. Its power heuristic between strategies has nothing to weigh here: no light is in
 // two strategies, and the hemisphere samples of the indirect light leave out what lights send straight to the surface.
 #include "techniques/common/shade.wgsl"

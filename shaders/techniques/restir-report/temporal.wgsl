@@ -1,6 +1,6 @@
 // Temporal reuse: the previous frame's reservoirs are merged into this frame's.
-// One invocation: one pixel. Reads both visibility buffers, this frame's reservoirs and the previous frame's final ones.
-// Writes the merged reservoirs.
+// One invocation: one pixel. Reads both visibility buffers, the scene, this frame's reservoirs and the previous frame's
+// final ones. Writes the merged reservoirs.
 // Source: report 003, section 4.5, with what it calls missing in section 8: reprojection, and a test that the history is
 // of the same surface. Surface and lights of the history are those of the previous frame, so that lights may revolve.
 #include "techniques/common/reprojection.wgsl"

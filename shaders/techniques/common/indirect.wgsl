@@ -1,5 +1,5 @@
-// Indirect light: the reference path tracer's later bounces, without the light that restir-di has already resampled.
-// One invocation: one pixel. Reads the visibility buffer and the scene. Writes indirect radiance.
+// Indirect light: the reference path tracer's later bounces, without the light that the technique estimates itself.
+// One invocation: one pixel. Reads the visibility buffer and the scene. Writes indirect radiance and counts rays.
 // Source: as path-tracer (techniques/path-tracer/path.wgsl).
 #include "scene/visibility_buffer.wgsl"
 #include "scene/counters.wgsl"
