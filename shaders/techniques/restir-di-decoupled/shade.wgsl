@@ -107,7 +107,8 @@ fn gather_sample(selection: Selection, i: u32) -> Sample {
 fn domain_target(domain: Domain, light: ResolvedLight) -> f32 {
     let sample = tile_light_sample(light.packed);
     // The sky and the sun may turn where nothing else moves.
-    if scene_has_motion || lights[sample.light].kind >= LIGHT_ENVIRONMENT {
+    let may_turn = (scene_has_environment || scene_has_sun) && lights[sample.light].kind >= LIGHT_ENVIRONMENT;
+    if scene_has_motion || may_turn {
         let before = light_contribution(sample, domain.position, true);
         return luminance(before.value) * approximate_scatter(domain, before.direction);
     }
