@@ -51,7 +51,8 @@ pub type Settings = BTreeMap<String, Value>;
 pub fn check(technique: &str, settings: &Settings) -> Result<()> {
     let info = techniques::find(technique)?;
     settings.iter().try_for_each(|(key, value)| info.spec(key)?.parse(&value.0).map(|_| ()))?;
-    info.check(settings.iter().map(|(key, value)| (key.as_str(), value.0.as_str())))
+    let settings: Vec<_> = settings.iter().map(|(key, value)| (key.as_str(), value.0.as_str())).collect();
+    (info.check)(&settings)
 }
 
 /// Sets up a technique with these settings and all others at their defaults.

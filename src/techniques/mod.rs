@@ -37,6 +37,9 @@ pub struct TechniqueInfo {
     pub views: &'static [&'static str],
     /// Its structs that have WGSL twins.
     pub layouts: &'static [Layout],
+    /// Refuses settings, as (name, value), that contradict each other when they are set one after the other: `BAD_VALUE` naming what
+    /// contradicts what, as [`Technique::set`]. It needs no device. Names that are not its own are passed over.
+    pub check: fn(&[(&str, &str)]) -> Result<()>,
     /// Makes one.
     pub create: fn(&Gpu) -> Box<dyn Technique>,
 }
@@ -61,23 +64,6 @@ impl TechniqueInfo {
                 name: key.to_owned(),
                 known: own.chain(render).chain(film).collect::<Vec<_>>().join(", "),
             }
-        })
-    }
-
-    /// Refuses settings that contradict each other when they are set one after the other; needs no device. Names that
-    /// are not its own are passed over.
-    ///
-    /// # Errors
-    /// `BAD_VALUE` naming what contradicts what, as [`Technique::set`].
-    pub fn check<'a>(&self, settings: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<()> {
-        // The only one whose parameters can contradict each other.
-        if self.id != restir_di_decoupled::INFO.id {
-            return Ok(());
-        }
-        let mut params = restir_di_decoupled::RestirDiDecoupledParams::default();
-        settings.into_iter().try_for_each(|(name, value)| {
-            params.set(name, value)?;
-            params.check()
         })
     }
 }

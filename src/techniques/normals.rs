@@ -24,6 +24,7 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
     params: NormalsParams::SPECS,
     views: &[],
     layouts: &[NormalsParams::LAYOUT],
+    check: |_| Ok(()),
     create: |gpu| Box::new(Normals { params: Default::default(), uniform: gpu.uniform("normals.params", 4) }),
 };
 

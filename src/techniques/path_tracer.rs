@@ -16,6 +16,7 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
     params: &[],
     views: &[],
     layouts: &[],
+    check: |_| Ok(()),
     create: |_| Box::new(PathTracer),
 };
 

@@ -101,6 +101,7 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
     params: RestirDiParams::SPECS,
     views: &["direct", "indirect", "contribution weight", "confidence weight", "light", "duplicates"],
     layouts: &[Reservoir::LAYOUT, RestirDiParams::LAYOUT],
+    check: |_| Ok(()),
     create: |gpu| Box::new(RestirDi::new(gpu)),
 };
 

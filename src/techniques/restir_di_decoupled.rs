@@ -129,6 +129,13 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
         DomainRecord::LAYOUT,
         RestirDiDecoupledParams::LAYOUT,
     ],
+    check: |settings| {
+        let mut params = RestirDiDecoupledParams::default();
+        settings.iter().try_for_each(|(name, value)| {
+            params.set(name, value)?;
+            params.check()
+        })
+    },
     create: |gpu| Box::new(RestirDiDecoupled::new(gpu)),
 };
 
@@ -142,7 +149,7 @@ const BIAS_CORRECTION_NONE: u32 = 0;
 impl RestirDiDecoupledParams {
     /// Refuses settings that contradict each other: the mode that traces every ray for the sake of unbiasedness, and what
     /// would spoil it.
-    pub(super) fn check(&self) -> Result<()> {
+    fn check(&self) -> Result<()> {
         if self.visibility != VISIBILITY_MIS {
             return Ok(());
         }

@@ -63,6 +63,7 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
     params: RestirReportParams::SPECS,
     views: &["area lights", "point lights", "indirect", "samples count", "not finite"],
     layouts: &[ReportReservoir::LAYOUT, RestirReportParams::LAYOUT],
+    check: |_| Ok(()),
     create: |gpu| Box::new(RestirReport::new(gpu)),
 };
 

@@ -32,6 +32,7 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
     params: RisParams::SPECS,
     views: &[],
     layouts: &[RisParams::LAYOUT],
+    check: |_| Ok(()),
     create: |gpu| {
         Box::new(Ris { params: Default::default(), uniform: gpu.uniform("ris.params", size_of::<RisParams>() as u64) })
     },

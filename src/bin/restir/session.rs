@@ -82,8 +82,8 @@ impl Session {
         for (key, value) in &options.set {
             technique.spec(key).map_or(Ok(0), |spec| spec.parse(value)).map_err(Failure::from_option)?;
         }
-        let settings = options.set.iter().map(|(key, value)| (key.as_str(), value.as_str()));
-        technique.check(settings).map_err(Failure::from_option)?;
+        let settings: Vec<_> = options.set.iter().map(|(key, value)| (key.as_str(), value.as_str())).collect();
+        (technique.check)(&settings).map_err(Failure::from_option)?;
         let flat = scene::open(name, &options.choice, Some((&options.lighting, options.seed)))?;
         report::warnings(&flat.warnings);
         let camera = scene::camera(&flat.cameras, options.camera.as_deref())?;
