@@ -49,7 +49,7 @@ pub fn scattered(brdf: &Brdf, angle: f64, wi: DVec3) -> DVec3 {
 const FRAMES: u32 = 8;
 const SHARP: f64 = 0.001;
 const FEWEST: usize = 16;
-const MOST: usize = 96;
+const MOST: usize = 192;
 
 /// The mean picture of either technique is `expected`, channel by channel.
 pub fn check(scene: &Scene, expected: DVec3, what: &str) {
