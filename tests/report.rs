@@ -87,7 +87,7 @@ const UNGUARDED: &str = "fault_unguarded_pdf";
 /// As lab/truth has it of `cornell-64` itself, which takes ten times as long.
 #[test]
 fn configurations_equal_the_path_tracer() {
-    let configurations = [("e-both", 40), ("a-naive", RUNS), ("b-ris", 40), ("c-temporal", 40), ("d-spatial", 40)];
+    let configurations = [("e-both", 96), ("a-naive", RUNS), ("b-ris", 40), ("c-temporal", 40), ("d-spatial", 40)];
     for &(configuration, runs) in cases(&configurations) {
         let comparison = compare(configuration, &[("configuration", configuration)], proof().effort(runs));
         assert!(comparison.is_equivalent(), "{configuration} is not equivalent");
