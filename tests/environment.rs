@@ -173,11 +173,13 @@ fn a_turning_map_is_the_map_turned() {
     let expected = reflected(&map, 42f64.to_radians()).y;
     // The map as it stood a few frames ago gives another number.
     let stale = reflected(&map, 30f64.to_radians()).y;
-    for (technique, setting) in [("restir-di", ("indirect", "no")), ("restir-di-decoupled", ("visibility", "mis"))] {
+    for (technique, setting, seeds) in
+        [("restir-di", ("indirect", "no"), 48), ("restir-di-decoupled", ("visibility", "mis"), 192)]
+    {
         let settings = [&settings("pyramid")[..], &[("indirect", "no"), setting]].concat();
         let mut restir = renderer(&gpu(), scene.clone(), [16, 16], technique, &settings);
         restir.set_accumulate(false);
-        let runs: Vec<f64> = (0..48)
+        let runs: Vec<f64> = (0..seeds)
             .map(|seed| {
                 restir.set_seed(seed);
                 let image = render(&mut restir, 8);

@@ -79,8 +79,8 @@ fn the_mean_is_right_while_everything_moves() {
     // All of it in view but its lights.
     scene.cameras[0] = Camera::look_at("still", [0.0, 1.2, 3.4].into(), [0.0, 0.35, -0.3].into(), 42f32.to_radians());
     let scene = flatten(&scene);
-    let reference = Estimate::radiance(&mut still(&scene), 8, proof().effort(100), TILE).unwrap();
-    let comparison = compare("moving", &mut playing(&gpu(), &scene, SPEED), proof().effort(128), TILE, &reference);
+    let reference = Estimate::radiance(&mut still(&scene), 8, 100, TILE).unwrap();
+    let comparison = compare("moving", &mut playing(&gpu(), &scene, SPEED), 128, TILE, &reference);
     assert!(comparison.is_equivalent());
 }
 
