@@ -59,13 +59,12 @@ const buildDecoders = () =>
 async function buildPage() {
   rmSync(staging, { recursive: true, force: true });
   mkdirSync(join(staging, 'pkg'), { recursive: true });
-  // With declarations: dist is also the npm package.
-  await run(['tsc', '--project', root, '--noEmit', 'false', '--declaration', '--outDir', staging]);
+  await run(['tsc', '--project', root, '--noEmit', 'false', '--outDir', staging]);
   for (const name of readdirSync(join(root, 'www')).filter((file) => !file.endsWith('.ts'))) {
     cpSync(join(root, 'www', name), join(staging, name), { recursive: true });
   }
   for (const [folder, name] of [[wasmPackage, 'restir'], [decoderPackage, 'decoders']]) {
-    for (const file of [`${name}.js`, `${name}.d.ts`, `${name}_bg.wasm`]) cpSync(join(folder, file), join(staging, 'pkg', file));
+    for (const file of [`${name}.js`, `${name}_bg.wasm`]) cpSync(join(folder, file), join(staging, 'pkg', file));
   }
   // The old page stays whole until the new one is.
   rmSync(dist, { recursive: true, force: true });

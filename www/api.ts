@@ -55,9 +55,6 @@ export interface Camera {
   half_height?: number;
 }
 
-/** Where a camera is and where it looks, in the scene's units; the directions need not be of length 1. */
-export type Pose = Pick<Camera, 'position' | 'forward' | 'up'>;
-
 /** What `Viewer.stats()` resolves to: rays and passes of the last frame, `nan` and `inf` since the picture began. */
 export interface Stats {
   rays: number;

@@ -35,18 +35,6 @@ const known: Record<string, { title: string; advice: string }> = {
   NOT_A_SCENE: { title: 'This is not a scene', advice: 'Drop a .glb or .restir file, or a .gltf or .obj together with the files that it names. An environment map is an .hdr or .exr file.' },
 };
 
-/** A failure as what a promise rejects with. */
-export class RestirError extends Error {
-  /** Stable: one of the keys of `known` above, `CANCELLED`, `DISPOSED` or `INTERNAL`. */
-  readonly code: string;
-
-  constructor({ code, message }: Failure) {
-    super(message);
-    this.name = 'RestirError';
-    this.code = code;
-  }
-}
-
 /** Any thrown value as a `Failure`. */
 export function toFailure(error: unknown): Failure {
   if (typeof error === 'object' && error !== null && 'message' in error) {

@@ -1,6 +1,5 @@
 // The settings panel, generated from the parameter declarations.
 import type { Parameter } from './api.js';
-import { isDefault } from './description.js';
 
 export interface Group {
   title: string;
@@ -11,6 +10,11 @@ export interface Group {
 
 /** Tells of a new value, or with undefined of a return to the default. */
 export type ParameterChanged = (key: string, value: string | undefined) => void;
+
+/** Whether `text` says the same as the parameter's default. */
+export function isDefault(parameter: Parameter, text: string): boolean {
+  return typeof parameter.default === 'number' ? Number(text) === parameter.default : text === String(parameter.default);
+}
 
 function make<Tag extends keyof HTMLElementTagNameMap>(tag: Tag, properties: Partial<HTMLElementTagNameMap[Tag]>): HTMLElementTagNameMap[Tag] {
   return Object.assign(document.createElement(tag), properties);

@@ -1,5 +1,4 @@
 // Reads or generates one scene and builds its BVH, off the page's thread.
-import { decoded, fetchBytes, fetchScene } from './fetch-scene.js';
 import init, { contents_of, flatten_builtin, flatten_file, uncook } from './pkg/restir.js';
 import { toFailure } from './messages.js';
 import type { Contents, LoadRequest, LoadResponse, Loaded, SceneSource, Surroundings } from './protocol.js';
@@ -11,11 +10,34 @@ const progress = (fraction: number, what: string) => reply({ kind: 'progress', f
 /** The last part of a path or URI: files picked or dropped come without their folders. */
 const baseName = (uri: string) => uri.slice(uri.lastIndexOf('/') + 1);
 
+function decoded(uri: string): string {
+  try {
+    return decodeURIComponent(uri);
+  } catch {
+    return uri;
+  }
+}
+
 /** What a decoder threw, with the name of the file. */
 function named(name: string, thrown: unknown) {
   const { code, message } = toFailure(thrown);
   if (message.startsWith(name)) return { code, message };
   return { code, message: `${name}: ${message}${code === 'UNSUPPORTED' ? ' is not supported' : ''}` };
+}
+
+/** The bytes of a map that was given by its address. */
+async function fetched({ name, address = '' }: Surroundings): Promise<Uint8Array> {
+  progress(0, `Loading ${name}`);
+  let problem = 'not found';
+  try {
+    const response = await fetch(address);
+    if (response.ok) return new Uint8Array(await response.arrayBuffer());
+    problem = `the server says ${response.status} ${response.statusText}`;
+  } catch (error) {
+    // A server that does not let this page read its files looks like one that is not there.
+    problem = `${(error as Error).message} (the server has to be there, and to allow this page to read its files)`;
+  }
+  throw { code: 'IO', message: `${name}: ${problem}` };
 }
 
 /** Decoders that only some files need are a module of their own. */
@@ -37,19 +59,11 @@ async function read(file: File): Promise<[string, Uint8Array]> {
 /** Name of what surrounds the scene, and the map that it is as the decoders give it. */
 type Around = [environment: string | undefined, map: Uint8Array | undefined];
 
-type FileSource = Exclude<SceneSource, { kind: 'builtin' }>;
-
-/** The scene file and those beside it, by name. */
-async function gather(source: FileSource): Promise<Map<string, Uint8Array>> {
-  progress(0, source.kind === 'file' ? 'Reading' : `Loading ${source.name}`);
-  return source.kind === 'file' ? new Map(await Promise.all(source.files.map(read))) : fetchScene(source.name, source.address);
-}
-
-async function flattenFile(source: FileSource, lights: number, seed: number, around: Around): Promise<Loaded> {
-  const { name, choice } = source;
-  const files = await gather(source);
-  const resolve = (uri: string) => files.get(decoded(uri)) ?? files.get(baseName(decoded(uri)));
-  const main = resolve(name) ?? new Uint8Array();
+async function flattenFile({ name, files, choice }: SceneSource & { kind: 'file' }, lights: number, seed: number, around: Around): Promise<Loaded> {
+  progress(0, 'Reading');
+  const beside = new Map(await Promise.all(files.map(read)));
+  const resolve = (uri: string) => beside.get(baseName(decoded(uri)));
+  const main = beside.get(baseName(name)) ?? new Uint8Array();
   const flatten = (bytes: Uint8Array, decoders: object | undefined, warnings: string[]) =>
     flatten_file(name, bytes, resolve, { ...choice, decoders, warnings }, lights, seed, ...around, progress);
 
@@ -72,11 +86,7 @@ async function flattenFile(source: FileSource, lights: number, seed: number, aro
 }
 
 async function readAround(surroundings: Surroundings | undefined): Promise<Around> {
-  let file = surroundings?.bytes;
-  if (surroundings?.address) {
-    progress(0, `Loading ${surroundings.name}`);
-    file = await fetchBytes(surroundings.name, surroundings.address);
-  }
+  const file = surroundings?.address ? await fetched(surroundings) : surroundings?.bytes;
   if (!surroundings || !file) return [surroundings?.name, undefined];
   const decoders = await fetchDecoders();
   try {

@@ -1,4 +1,0 @@
-// A page whose only moving parts are its viewers.
-import { startViewers } from './viewers.js';
-
-void startViewers();
