@@ -15,7 +15,8 @@ const selector = ({ kind: [kind], name }) => (kind === 'test' || kind === 'bin' 
 async function build(env) {
   const output = await run(['cargo', 'test', '--quiet', '--no-run', '--message-format=json-render-diagnostics'], { env });
   const artifacts = output.split('\n').filter((line) => line.startsWith('{')).map((line) => JSON.parse(line));
-  return artifacts.filter(({ profile, executable }) => profile?.test && executable).map(({ target, executable }) => ({ name: selector(target), path: executable }));
+  const programs = artifacts.filter(({ profile, executable }) => profile?.test && executable);
+  return programs.map(({ target, executable }) => ({ name: selector(target), path: executable }));
 }
 
 /** Adds up the `test result:` lines. */

@@ -1,7 +1,7 @@
 // Boiling filter: reservoirs whose estimate is far above those around it are emptied, so that a lucky sample does not stay
 // for as long as it is remembered. Biased: what it throws away is light.
-// One invocation: one pixel; a workgroup's pixels are compared. Reads the visibility buffer and
-// the scene. Reads and writes reservoirs.
+// One invocation: one pixel; a workgroup's pixels are compared. Reads the visibility buffer, the scene and
+// reservoirs. Writes reservoirs.
 // Source: ours, in the manner of production renderers.
 #include "scene/visibility_buffer.wgsl"
 #include "techniques/common/resampling.wgsl"
