@@ -111,7 +111,7 @@ pub fn run(args: &Args) -> Result<()> {
     }
 
     let counters = block_on(session.renderer.counters())?;
-    let broken = counters.nan + counters.inf;
+    let broken = counters.not_finite();
     if broken > 0 {
         session.warnings.push(format!("{broken} samples were not finite and were left out"));
         report::warnings(session.warnings.last());
