@@ -104,12 +104,20 @@ fn load_texture_slot(material: u32, texel: u32) -> TextureSlot {
 }
 
 fn load_material(material: u32) -> Material {
-    let emissive = material_texel(material, 1u);
     let factors = material_texel(material, 2u);
     return Material(
         bitcast<vec4f>(material_texel(material, 0u)),
-        bitcast<vec3f>(emissive.xyz), bitcast<f32>(emissive.w),
+        load_emissive_factor(material), bitcast<f32>(material_texel(material, 1u).w),
         bitcast<f32>(factors.x), bitcast<f32>(factors.y), bitcast<f32>(factors.z), factors.w,
         load_texture_slot(material, 3u), load_texture_slot(material, 5u), load_texture_slot(material, 7u),
-        load_texture_slot(material, 9u));
+        load_emissive_slot(material));
+}
+
+// Lights need no more of a material than these two.
+fn load_emissive_factor(material: u32) -> vec3f {
+    return bitcast<vec3f>(material_texel(material, 1u).xyz);
+}
+
+fn load_emissive_slot(material: u32) -> TextureSlot {
+    return load_texture_slot(material, 9u);
 }

@@ -119,9 +119,8 @@ fn emitted_radiance(triangle: u32, uv: vec2f, cosine: f32) -> vec3f {
     if scene_has_alpha_masks && (t.flags & TRIANGLE_ALPHA_MASK) != 0u && !passes_alpha(triangle, uv) {
         return vec3f(0.0);
     }
-    let material = load_material(t.material);
     let uvs = texture_finest(triangle_uvs(triangle, uv));
-    var radiance = material.emissive * texture_read(material.emissive_texture, uvs).rgb;
+    var radiance = load_emissive_factor(t.material) * texture_read(load_emissive_slot(t.material), uvs).rgb;
     if scene_has_clearcoat {
         let extensions = load_extensions(t.material);
         let coat = extensions.clearcoat * texture_read(extensions.clearcoat_texture, uvs).r;

@@ -170,30 +170,35 @@ fn lobe_probabilities(bsdf: Bsdf, lobes: u32, wo: vec3f) -> LobeProbabilities {
     let through = below_sheen * base * (1.0 - max_component(dielectric));
     let specular = below_sheen * luminance(specular_reflectance(bsdf, dielectric, wo.z));
 
-    var weights = LobeProbabilities(through, specular, 0.0, sheen, coat);
-    // Whether a lobe is there at all; its weight at the mirror angle may be zero all the same.
-    var present = LobeProbabilities(base, 1.0, 0.0, luminance(bsdf.sheen_color), bsdf.clearcoat);
+    // Weights of the lobes that are asked for. A lobe that is there is chosen now and then even where its weight is zero.
+    var w = LobeProbabilities();
+    w.diffuse = select(0.0, through, has_lobe(lobes, LOBE_DIFFUSE));
+    w.specular = select(0.0, specular, has_lobe(lobes, LOBE_SPECULAR));
+    var untransmitted = base;
     if scene_has_transmission {
-        weights.diffuse = through * (1.0 - bsdf.transmission);
-        weights.transmission = through * bsdf.transmission;
-        present.diffuse = base * (1.0 - bsdf.transmission);
-        present.transmission = base * bsdf.transmission;
+        w.transmission = select(0.0, through * bsdf.transmission, has_lobe(lobes, LOBE_TRANSMISSION));
+        w.diffuse *= 1.0 - bsdf.transmission;
+        untransmitted *= 1.0 - bsdf.transmission;
     }
-    var sum = 0.0;
-    sum += select(0.0, weights.diffuse, has_lobe(lobes, LOBE_DIFFUSE));
-    sum += select(0.0, weights.specular, has_lobe(lobes, LOBE_SPECULAR));
-    sum += select(0.0, weights.transmission, scene_has_transmission && has_lobe(lobes, LOBE_TRANSMISSION));
-    sum += select(0.0, weights.sheen, scene_has_sheen && has_lobe(lobes, LOBE_SHEEN));
-    sum += select(0.0, weights.clearcoat, scene_has_clearcoat && has_lobe(lobes, LOBE_CLEARCOAT));
-    let scale = 1.0 / max(sum, 1e-20);
-    var p: LobeProbabilities;
-    p.diffuse = raised(weights.diffuse * scale, has_lobe(lobes, LOBE_DIFFUSE) && present.diffuse > 0.0);
-    p.specular = raised(weights.specular * scale, has_lobe(lobes, LOBE_SPECULAR));
-    p.transmission = raised(weights.transmission * scale,
-        scene_has_transmission && has_lobe(lobes, LOBE_TRANSMISSION) && present.transmission > 0.0);
-    p.sheen = raised(weights.sheen * scale, scene_has_sheen && has_lobe(lobes, LOBE_SHEEN) && present.sheen > 0.0);
-    p.clearcoat = raised(weights.clearcoat * scale,
-        scene_has_clearcoat && has_lobe(lobes, LOBE_CLEARCOAT) && present.clearcoat > 0.0);
+    if scene_has_sheen {
+        w.sheen = select(0.0, sheen, has_lobe(lobes, LOBE_SHEEN));
+    }
+    if scene_has_clearcoat {
+        w.clearcoat = select(0.0, coat, has_lobe(lobes, LOBE_CLEARCOAT));
+    }
+    let scale = 1.0 / max(w.diffuse + w.specular + w.transmission + w.sheen + w.clearcoat, 1e-20);
+    var p = LobeProbabilities();
+    p.diffuse = raised(w.diffuse * scale, has_lobe(lobes, LOBE_DIFFUSE) && untransmitted > 0.0);
+    p.specular = raised(w.specular * scale, has_lobe(lobes, LOBE_SPECULAR));
+    if scene_has_transmission {
+        p.transmission = raised(w.transmission * scale, has_lobe(lobes, LOBE_TRANSMISSION) && base * bsdf.transmission > 0.0);
+    }
+    if scene_has_sheen {
+        p.sheen = raised(w.sheen * scale, has_lobe(lobes, LOBE_SHEEN) && luminance(bsdf.sheen_color) > 0.0);
+    }
+    if scene_has_clearcoat {
+        p.clearcoat = raised(w.clearcoat * scale, has_lobe(lobes, LOBE_CLEARCOAT) && bsdf.clearcoat > 0.0);
+    }
     let total = p.diffuse + p.specular + p.transmission + p.sheen + p.clearcoat;
     let normalization = 1.0 / max(total, 1e-20);
     return LobeProbabilities(p.diffuse * normalization, p.specular * normalization, p.transmission * normalization,

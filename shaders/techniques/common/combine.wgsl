@@ -57,11 +57,11 @@ fn combination_valuers() -> u32 {
 
 // p-hat_j(x_i).
 fn domain_target(surface: Surface, sample: LightSample, is_own: bool, previous: bool) -> f32 {
-    let value = target_function(surface, sample, previous);
-    if !reuse_visibility || value <= 0.0 || (reservoirs_are_visible && is_own) {
-        return value;
+    let valued = value_sample(surface, sample, previous);
+    if !reuse_visibility || valued.target_value <= 0.0 || (reservoirs_are_visible && is_own) {
+        return valued.target_value;
     }
-    return select(0.0, value, sample_is_visible(surface, sample, previous));
+    return select(0.0, valued.target_value, sample_is_visible(surface, valued, previous));
 }
 
 // The part of m_i that domain j > 0 has a say in, by its value of x_i: i is j or 0.

@@ -24,14 +24,26 @@ fn direct_scatter(surface: Surface, wi: vec3f, distance: f32) -> vec3f {
     return surface_scatter(surface, wi, distance);
 }
 
+// A light sample as a surface values it.
+struct ValuedSample {
+    target_value: f32, // p-hat
+    direction: vec3f, // of its shadow ray
+    distance: f32,
+}
+
 // The target function of direct light: luminance of the unshadowed integrand, p-hat = lum(f L G)
 // (Bitterli et al. 2020, section 3). `previous` evaluates it in the previous frame.
-fn target_function(surface: Surface, sample: LightSample, previous: bool) -> f32 {
+fn value_sample(surface: Surface, sample: LightSample, previous: bool) -> ValuedSample {
     if sample.light == NONE {
-        return 0.0;
+        return ValuedSample();
     }
     let light = light_contribution(sample, surface.position, previous);
-    return luminance(direct_scatter(surface, light.direction, light.distance) * light.value);
+    let value = luminance(direct_scatter(surface, light.direction, light.distance) * light.value);
+    return ValuedSample(value, light.direction, light.distance);
+}
+
+fn target_function(surface: Surface, sample: LightSample, previous: bool) -> f32 {
+    return value_sample(surface, sample, previous).target_value;
 }
 
 // Whether there are BSDF samples among the candidates, fixed when a pipeline is made (src/techniques/candidates.rs).
@@ -63,10 +75,9 @@ fn stream_contribution_weight(stream: Stream, target_value: f32) -> f32 {
 }
 
 // V between a surface and a light sample, in this frame or, for a surface of the previous one, in that.
-fn sample_is_visible(surface: Surface, sample: LightSample, previous: bool) -> bool {
-    let light = light_contribution(sample, surface.position, previous);
+fn sample_is_visible(surface: Surface, sample: ValuedSample, previous: bool) -> bool {
     let top_level = select(frame.top_level, frame.previous_top_level, previous);
-    return is_visible_from(top_level, surface, light.direction, light.distance);
+    return is_visible_from(top_level, surface, sample.direction, sample.distance);
 }
 
 // The estimate of direct light that a reservoir stands for: f L G V W.

@@ -23,9 +23,10 @@ fn sample_pixel(pixel: vec2u) {
     select_candidates(surface, settings, &rng);
     for (var slot = 0u; slot < slots; slot += 1u) {
         let sample = streams[slot].selected;
-        var weight = stream_contribution_weight(streams[slot], target_function(surface, sample, false));
+        let valued = value_sample(surface, sample, false);
+        var weight = stream_contribution_weight(streams[slot], valued.target_value);
         // Visibility reuse: a shadowed sample is not passed on.
-        if weight > 0.0 && params.visibility_reuse == 1u && !sample_is_visible(surface, sample, false) {
+        if weight > 0.0 && params.visibility_reuse == 1u && !sample_is_visible(surface, valued, false) {
             weight = 0.0;
         }
         store_reservoir(pixel, slot, Reservoir(sample.light, sample.point, weight, 1.0));

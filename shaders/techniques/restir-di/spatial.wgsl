@@ -58,13 +58,11 @@ fn reuse_pixel(pixel: vec2u) {
         keep(pixel);
         return;
     }
-    let surface = load_pixel(pixel);
     var rng = rng_new(pixel, frame.index, frame.seed, STREAM_SPATIAL + pass_index.value);
 
     // Domain 0 is the pixel itself, the others are those neighbours that are like enough.
     var domains: array<vec2u, MAXIMUM_DOMAINS>;
-    domains[0] = pixel;
-    var found = 1u;
+    var found = 0u;
     var wanted = params.spatial_neighbors;
     if confidence_weight <= 1.0 {
         wanted = max(wanted, params.disocclusion_neighbors);
@@ -73,17 +71,29 @@ fn reuse_pixel(pixel: vec2u) {
     if params.spatial_pattern == SPATIAL_PATTERN_LOW_DISCREPANCY {
         start = random_2(&rng);
     }
-    for (var i = 0u; i < wanted * params.spatial_retries && found <= wanted; i += 1u) {
-        let offset = sample_disk(neighbor_point(i, start, &rng)) * params.spatial_radius;
-        let candidate = vec2i(floor(vec2f(pixel) + 0.5 + offset));
-        if any(candidate < vec2i(0)) || any(candidate >= vec2i(frame.size)) || all(candidate == vec2i(pixel)) {
+    // The pixel's surface is read in the loop, too: twice the code that reads one would be a fifth of what is compiled here.
+    var surface: Surface;
+    for (var i = 0u; i <= wanted * params.spatial_retries && found <= wanted; i += 1u) {
+        var domain = pixel;
+        if i > 0u {
+            let offset = sample_disk(neighbor_point(i - 1u, start, &rng)) * params.spatial_radius;
+            let candidate = vec2i(floor(vec2f(pixel) + 0.5 + offset));
+            if any(candidate < vec2i(0)) || any(candidate >= vec2i(frame.size)) || all(candidate == vec2i(pixel)) {
+                continue;
+            }
+            domain = vec2u(candidate);
+            if !pixel_has_surface(domain) {
+                continue;
+            }
+        }
+        let seen = load_pixel(domain);
+        if i == 0u {
+            surface = seen;
+        } else if !is_similar(surface, seen) {
             continue;
         }
-        let neighbor = vec2u(candidate);
-        if pixel_has_surface(neighbor) && is_similar(surface, load_pixel(neighbor)) {
-            domains[found] = neighbor;
-            found += 1u;
-        }
+        domains[found] = domain;
+        found += 1u;
     }
 
     for (var slot = 0u; slot < slot_count(); slot += 1u) {
