@@ -2,6 +2,7 @@
 
 mod support;
 
+use restir::Gpu;
 use restir::lab::experiment::{Axis, Metric};
 use restir::lab::settings::{Settings, Value};
 use restir::lab::truth::equivalence::counted_pictures;
@@ -83,11 +84,22 @@ fn load(name: &str) -> restir::Result<restir::FlatScene> {
 
 /// Carries an experiment out; gives what came of it and how often each kind of work was heard of.
 fn run(folder: &Path, cache: &Path, experiment: &Experiment, fresh: bool) -> (Outcome, Vec<String>) {
+    let (outcome, heard) = try_run(&gpu(), folder, cache, experiment, fresh);
+    (outcome.unwrap(), heard)
+}
+
+fn try_run(
+    gpu: &Gpu,
+    folder: &Path,
+    cache: &Path,
+    experiment: &Experiment,
+    fresh: bool,
+) -> (restir::Result<Outcome>, Vec<String>) {
     let heard = RefCell::new(Vec::new());
     let outcome = lab::run(
         "tiny",
         experiment,
-        &gpu(),
+        gpu,
         &Options {
             out: folder,
             references: cache,
@@ -97,7 +109,29 @@ fn run(folder: &Path, cache: &Path, experiment: &Experiment, fresh: bool) -> (Ou
             progress: &|what, _, _| heard.borrow_mut().push(what.to_owned()),
         },
     );
-    (outcome.unwrap(), heard.into_inner())
+    (outcome, heard.into_inner())
+}
+
+#[test]
+fn a_reference_that_loses_samples_is_refused() {
+    let (out, cache) = (Folder::new("broken-out"), Folder::new("broken-cache"));
+    let gpu = fresh_gpu();
+    gpu.plant("return surface.emission + scattered_radiance", "return sqrt(-1.0 - f32(pixel.x)) * scattered_radiance")
+        .unwrap();
+    let error = try_run(&gpu, &out.0, &cache.0, &tiny(), false).0.expect_err("it is all NaN");
+    assert!(error.code() == "BAD_VALUE" && error.to_string().contains("not finite"), "{error}");
+    assert!(cache.names("").is_empty(), "a broken reference was kept");
+}
+
+#[test]
+fn another_size_is_taken_unless_sizes_are_swept() {
+    let mut experiment = tiny();
+    assert!(experiment.set_size([10, 20]));
+    assert_eq!(experiment.size, [10, 20]);
+    let mut swept = library::find("resolutions").unwrap();
+    let before = swept.size;
+    assert!(!swept.set_size([10, 20]));
+    assert_eq!(swept.size, before);
 }
 
 #[test]

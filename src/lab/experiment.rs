@@ -346,6 +346,15 @@ impl Experiment {
         series.accumulate.unwrap_or(self.accumulate)
     }
 
+    /// Gives all pictures another size. Where the size is what is swept nothing changes, and this is `false`.
+    pub fn set_size(&mut self, size: [u32; 2]) -> bool {
+        let is_free = self.sweeps.first().is_none_or(|sweep| sweep.key != "size");
+        if is_free {
+            self.size = size;
+        }
+        is_free
+    }
+
     /// Picture sizes: those that are swept, else the one there is.
     ///
     /// # Errors

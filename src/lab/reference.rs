@@ -91,6 +91,7 @@ pub fn reference(
             }
             progress(half as u64 * u64::from(frames) + u64::from(frame) + 1, 2 * u64::from(frames));
         }
+        refuse_broken(block_on(renderer.counters())?.not_finite())?;
         let image = block_on(renderer.read_image())?;
         std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.display().to_string(), source })?;
         let parameters = renderer.parameters().to_string();
@@ -113,6 +114,17 @@ pub fn reference(
     let pixels = halves[0].pixels.iter().zip(&halves[1].pixels).map(|(a, b)| [0, 1, 2].map(|c| 0.5 * (a[c] + b[c])));
     let image = Image { pixels: pixels.collect(), ..halves[0] };
     Ok(Reference { image, noise, key })
+}
+
+/// A reference that has lost samples is none.
+///
+/// # Errors
+/// `BAD_VALUE` if a sample was not finite.
+pub(super) fn refuse_broken(not_finite: u64) -> Result<()> {
+    if not_finite > 0 {
+        return Err(Error::bad_value("reference", format!("{not_finite} samples are not finite")));
+    }
+    Ok(())
 }
 
 /// Where references are kept unless another folder is named: `restir/references` in the user's cache folder.

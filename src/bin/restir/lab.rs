@@ -63,8 +63,8 @@ pub fn run(args: &Args) -> Result<()> {
     let mut outcomes = serde_json::Map::new();
     for (name, experiment) in experiments {
         let mut experiment = if args.quick { experiment.quick() } else { experiment };
-        if let Some(size) = args.size {
-            experiment.size = size.to_array();
+        if args.size.is_some_and(|size| !experiment.set_size(size.to_array())) {
+            report::warnings([&format!("{name} sweeps its size: --size changes nothing")]);
         }
         let bar = Bar::default();
         let outcome = lab::run(

@@ -3,6 +3,7 @@
 use super::equivalence::{Comparison, Estimate, Margins, Proof, counted_pictures};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::lab::reference::refuse_broken;
 use crate::lab::settings::{self, Settings, View};
 use crate::renderer::Renderer;
 use crate::scene::FlatScene;
@@ -239,9 +240,7 @@ pub fn check(
     let mut renderer = trial.renderer(gpu, scene)?;
     settings::apply(&mut renderer, "path-tracer", &trial.render)?;
     let (reference, not_finite) = estimate(&mut renderer, less(trial.reference))?;
-    if not_finite > 0 {
-        return Err(Error::bad_value("reference", format!("{not_finite} samples are not finite")));
-    }
+    refuse_broken(not_finite)?;
     let mut findings = Vec::new();
     for claim in &trial.claims {
         let what = claim.what();
