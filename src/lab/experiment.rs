@@ -348,11 +348,15 @@ impl Experiment {
 
     /// Gives all pictures another size. Where the size is what is swept nothing changes, and this is `false`.
     pub fn set_size(&mut self, size: [u32; 2]) -> bool {
-        let is_free = self.sweeps.first().is_none_or(|sweep| sweep.key != "size");
+        let is_free = self.size_sweep().is_none();
         if is_free {
             self.size = size;
         }
         is_free
+    }
+
+    fn size_sweep(&self) -> Option<&Sweep> {
+        self.sweeps.first().filter(|sweep| sweep.key == "size")
     }
 
     /// Picture sizes: those that are swept, else the one there is.
@@ -360,7 +364,7 @@ impl Experiment {
     /// # Errors
     /// `BAD_FILE` for a value that is none; `name` is for that.
     pub(super) fn sizes(&self, name: &str) -> Result<Vec<[u32; 2]>> {
-        match self.sweeps.first().filter(|sweep| sweep.key == "size") {
+        match self.size_sweep() {
             Some(sweep) => sweep.values.iter().map(|value| parse_size(name, value)).collect(),
             None => Ok(vec![self.size]),
         }
