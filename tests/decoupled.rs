@@ -152,7 +152,7 @@ fn small_things_work() {
 fn contradictions_are_refused_by_both_names() {
     let gpu = gpu();
     let mut renderer = renderer(&gpu, builtin("cornell"), [8, 8], TECHNIQUE, &[]);
-    for (name, good, bad) in [("bias_correction", "mis", "none"), ("checkerboard", "no", "yes")] {
+    for (name, good, bad) in [("reuse_weights", "balance", "heuristics"), ("checkerboard", "no", "yes")] {
         renderer.set("visibility", "mis").expect("alone it is fine");
         let error = renderer.set(name, bad).expect_err("a contradiction");
         assert_eq!(error.code(), "BAD_VALUE");

@@ -225,7 +225,7 @@ fn contradictory_settings_are_refused() {
     };
     for (settings, values) in [
         ("visibility = \"mis\", checkerboard = true", ""),
-        ("visibility = \"mis\", bias_correction = \"none\"", ""),
+        ("visibility = \"mis\", reuse_weights = \"heuristics\"", ""),
         ("checkerboard = true", "\"decoupled\", \"mis\""),
     ] {
         let error = parse(settings, values).expect_err(settings);

@@ -248,7 +248,7 @@ fn shaders_have_room_for_what_parameters_allow() {
 fn shaders_number_choices_as_declared() {
     let params = |id| techniques::find(id).expect("a technique").params;
     let choices = [
-        ("REUSE_WEIGHT_", params("restir-di-decoupled"), "bias_correction"),
+        ("REUSE_WEIGHT_", params("restir-di-decoupled"), "reuse_weights"),
         ("VISIBILITY_", params("restir-di-decoupled"), "visibility"),
         ("SPATIAL_PATTERN_", params("restir-di"), "spatial_pattern"),
         ("PIXEL_ORDER_", params("restir-di"), "pixel_order"),

@@ -87,8 +87,8 @@ crate::params! {
         visibility_reuse_radius: float(0.0, 0.0..=256.0, "pixels"),
         /// With visibility at decoupled: for how many frames a ray's answer may be reused. Higher: fewer rays, shadows lag behind what moves (biased). 255: for ever. 0: always traced, as far as two rays a pixel go.
         visibility_lifetime: uint(4, 0..=255, "frames"),
-        /// How the three samples are weighted. none divides by all confidence (1/M) and is biased; 1/z divides by that of pixels that could have made the sample, mis weights by the balance heuristic. Both are unbiased where visibility is shading or mis.
-        bias_correction: choice(2, ["none", "1/z", "mis"]),
+        /// How the three samples are weighted. heuristics divides by all confidence of like pixels (1/M) and is biased; 1/z divides by that of pixels that could have made the sample, balance weights by the balance heuristic. Both are unbiased where visibility is shading or mis.
+        reuse_weights: choice(2, ["heuristics", "1/z", "balance"]),
         /// Join the sample of the same point in the previous frame. On: far less noise, frames become correlated. Adds no bias of its own.
         temporal_reuse: flag(true),
         /// Join the sample of a pixel near that point in the previous frame. On: samples spread, also to where there is no history; neighbours become correlated. Adds no bias of its own.
@@ -118,7 +118,7 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
     summary: "Direct light by the production pipeline of 2021: light tiles, three kernels, three samples shaded with one or two rays.",
     papers: &["Wyman and Panteleev 2021", "Lin 2022 (dissertation), chapter 6 for conventions"],
     unbiased: false,
-    bias: "Unbiased with visibility = mis or shading, while bias_correction is mis or 1/z and checkerboard is off. The default, \
+    bias: "Unbiased with visibility = mis or shading, while reuse_weights is balance or 1/z and checkerboard is off. The default, \
            decoupled, is too dark at the edges of shadows.",
     params: RestirDiDecoupledParams::SPECS,
     views: &["direct", "indirect", "candidate", "temporal", "spatiotemporal", "confidence weight", "light", "subset"],
@@ -143,8 +143,8 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
 const VISIBILITY_NONE: u32 = 0;
 /// `visibility = mis`.
 const VISIBILITY_MIS: u32 = 6;
-/// `bias_correction = none`.
-const BIAS_CORRECTION_NONE: u32 = 0;
+/// `reuse_weights = heuristics`.
+const REUSE_WEIGHTS_HEURISTICS: u32 = 0;
 
 impl RestirDiDecoupledParams {
     /// Refuses settings that contradict each other: the mode that traces every ray for the sake of unbiasedness, and what
@@ -154,7 +154,7 @@ impl RestirDiDecoupledParams {
             return Ok(());
         }
         let contradiction = [
-            (self.bias_correction == BIAS_CORRECTION_NONE, "bias_correction = none, whose weights take no rays"),
+            (self.reuse_weights == REUSE_WEIGHTS_HEURISTICS, "reuse_weights = heuristics, whose weights take no rays"),
             (self.checkerboard == 1, "checkerboard = true, which saves rays"),
         ];
         match contradiction.into_iter().find(|(holds, _)| *holds) {

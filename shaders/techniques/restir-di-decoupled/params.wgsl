@@ -10,7 +10,7 @@ struct RestirDiDecoupledParams {
     visibility: u32,
     visibility_reuse_radius: f32,
     visibility_lifetime: u32,
-    bias_correction: u32,
+    reuse_weights: u32,
     temporal_reuse: u32,
     spatiotemporal_reuse: u32,
     spatiotemporal_radius: f32,
@@ -32,9 +32,9 @@ const VISIBILITY_KEEP = 4u; // (e) all three, for both; a shadowed reservoir kee
 const VISIBILITY_DECOUPLED = 5u; // (f) the candidate for both, the others, reused where that will do, for shading
 const VISIBILITY_MIS = 6u; // every sample in every domain, for shading, resampling and its weights
 
-const REUSE_WEIGHT_NONE = 0u;
+const REUSE_WEIGHT_HEURISTICS = 0u;
 const REUSE_WEIGHT_Z = 1u;
-const REUSE_WEIGHT_MIS = 2u;
+const REUSE_WEIGHT_BALANCE = 2u;
 
 @group(1) @binding(3) var<uniform> params: RestirDiDecoupledParams;
 

@@ -118,7 +118,7 @@ fn domain_target(domain: Domain, light: ResolvedLight) -> f32 {
 
 // m_i(x_i), by what each domain makes of the sample: p-hat_0 is `own_target`.
 fn mis_weight_of(i: u32, selection: Selection, confidences: vec3f, light: ResolvedLight, own_target: f32) -> f32 {
-    if params.bias_correction == REUSE_WEIGHT_NONE {
+    if params.reuse_weights == REUSE_WEIGHT_HEURISTICS {
         return confidences[i] / (confidences.x + confidences.y + confidences.z);
     }
     var numerator = 0.0;
@@ -136,7 +136,7 @@ fn mis_weight_of(i: u32, selection: Selection, confidences: vec3f, light: Resolv
             value = 0.0;
         }
         var share = confidences[j] * value;
-        if params.bias_correction == REUSE_WEIGHT_Z {
+        if params.reuse_weights == REUSE_WEIGHT_Z {
             share = select(0.0, confidences[j], value > 0.0);
         }
         denominator += share;
