@@ -12,10 +12,13 @@ use crate::scene::Camera;
 use pollster::block_on;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Fewest frames that a time is the median of.
 const FEWEST_TIMES: u32 = 5;
+
+/// How long a GPU works before it is timed.
+const WARM_UP: Duration = Duration::from_millis(100);
 
 /// Everything that determines the numbers of a run.
 #[derive(Debug, Clone)]
@@ -139,19 +142,26 @@ impl Task<'_> {
         camera
     }
 
-    /// Compiles what the run needs, so that no measured frame waits for that.
+    /// Compiles what the run needs, so that no measured frame waits for that, and keeps a GPU at work until its clock is up
+    /// again: one that slept while pictures were judged runs its next frames at half speed.
     ///
     /// # Errors
     /// Those of rendering.
     pub fn warm_up(&self, renderer: &mut Renderer) -> Result<()> {
         self.prepare(renderer)?;
-        for frame in 1..=2.min(self.frames.last().copied().unwrap_or(1)) {
+        let frames = 2.min(self.frames.last().copied().unwrap_or(1));
+        let mut compiled: Option<Instant> = None;
+        let mut frame = 0;
+        while frame < frames || compiled.is_none_or(|since| since.elapsed() < WARM_UP) {
+            frame += 1;
             if self.motion.is_some() {
-                renderer.set_camera(&self.camera_at(frame));
+                renderer.set_camera(&self.camera_at(frame.min(frames)));
             }
             renderer.render_frame()?;
+            block_on(renderer.wait())?;
+            compiled.get_or_insert_with(Instant::now);
         }
-        block_on(renderer.wait())
+        Ok(())
     }
 
     /// A debug view of the frame after the last one measured.

@@ -72,6 +72,19 @@ test('switches scene, technique and size, and keeps the address up to date', () 
     assert.equal((await readDisplay(page)).length, 48 * 24 * 3);
   }));
 
+for (const fault of [false, true]) {
+  test(`samples that are not numbers are ${fault ? 'counted on screen' : 'not there, and not mentioned'}`, () =>
+    withPage(
+      `?scene=cornell-64&technique=restir-report&configuration=e-both&fault_unguarded_pdf=${fault}&size=64x64&frames=4`,
+      async (page) => {
+        await waitForFrames(page, 4);
+        await page.waitForFunction(() => document.querySelector('#status').textContent.startsWith('4 frames'));
+        const count = await page.$eval('#status', (status) => status.querySelector('strong')?.textContent ?? '');
+        assert.match(count, fault ? /^[1-9]\d* NaN/ : /^$/);
+      },
+    ));
+}
+
 test('follows the window', () =>
   withPage('?scene=cornell&technique=normals&scale=0.25', async (page) => {
     await waitForFrames(page, 1);
