@@ -11,7 +11,7 @@ const lastLine = (output) => output.trim().split('\n').at(-1);
 /** Node's test runner ends with `# pass N` among its counts. */
 const nodeSummary = (output) => `${/^. pass (\d+)/m.exec(output)?.[1] ?? 0} passed`;
 
-const browserTestFiles = ['first-picture', 'page', 'formats'].map((name) => `tests/browser/${name}.test.mjs`);
+const browserTestFiles = ['first-picture', 'page', 'panel', 'formats', 'element', 'learn'].map((name) => `tests/browser/${name}.test.mjs`);
 
 const browserTests = (browser, env) => async () =>
   nodeSummary(await run(['node', '--test', '--test-concurrency=1', '--test-reporter=spec', ...browserTestFiles], { env: { ...env, BROWSER: browser } }));
@@ -25,7 +25,7 @@ function steps() {
     ['format', () => cargo('fmt', '--check')],
     ['clippy', () => cargo('clippy', '--all-targets', '--', '-D', 'warnings')],
     // In release, so that the page's build finds its build dependencies made.
-    ['clippy, wasm', () => cargo('clippy', '--release', '--lib', '--target', 'wasm32-unknown-unknown', '--', '-D', 'warnings')],
+    ['clippy, wasm', () => cargo('clippy', '--release', '--workspace', '--lib', '--target', 'wasm32-unknown-unknown', '--', '-D', 'warnings')],
     ['rust tests', () => rustTests(env, { whole: process.argv.includes('--whole') })],
     ['tint', async () => lastLine(await run(['node', 'scripts/tint.mjs']))],
     ['page', () => build()],

@@ -5,7 +5,8 @@ use crate::scene::builtin;
 use crate::techniques;
 
 /// The registry as JSON: `version`, `techniques` (as [`techniques::describe_json`]), the parameters of all techniques
-/// `render.params` and `film.params` (each as [`ParamSpec::describe`]), and `scenes` (as [`builtin::describe_json`]).
+/// `render.params` and `film.params` (each as [`ParamSpec::describe`]), `presets` (as [`techniques::presets::describe_json`]) and `scenes` (as
+/// [`builtin::describe_json`]).
 pub fn describe() -> serde_json::Value {
     let group = |specs: &[ParamSpec]| serde_json::json!({ "params": specs.iter().map(ParamSpec::describe).collect::<serde_json::Value>() });
     serde_json::json!({
@@ -13,6 +14,7 @@ pub fn describe() -> serde_json::Value {
         "techniques": techniques::describe_json(),
         "render": group(RenderParams::SPECS),
         "film": group(FilmParams::SPECS),
+        "presets": techniques::presets::describe_json(),
         "scenes": builtin::describe_json(),
     })
 }

@@ -18,7 +18,7 @@ pub mod renderer;
 pub mod scene;
 pub mod techniques;
 #[cfg(target_arch = "wasm32")]
-mod web;
+pub mod web;
 
 pub use describe::describe;
 pub use error::{Error, Result};

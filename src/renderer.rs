@@ -203,7 +203,7 @@ impl Renderer {
 
     /// Frames in the accumulated picture.
     pub fn accumulated_frames(&self) -> u32 {
-        self.accumulated
+        if self.restart_film { 0 } else { self.accumulated }
     }
 
     /// The id of the technique in use.

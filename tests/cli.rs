@@ -182,6 +182,10 @@ fn wrong_names_and_values_are_exit_code_2_and_say_what_is_right() {
     render("builtin:cornell", &["--camera", "nobody"], "UNKNOWN_NAME", "nobody");
     render("builtin:cornell", &["--camera", "99"], "UNKNOWN_NAME", "99");
     render("builtin:cornell", &["--technique", "magic"], "UNKNOWN_NAME", "restir-di");
+    render("missing.glb", &["--preset", "bitterli"], "UNKNOWN_NAME", "bitterli-2020-unbiased");
+    render("missing.glb", &["--preset", "lanz-2025", "--technique", "ris"], "USAGE", "--technique");
+    render("missing.glb", &["--pose", "0,0,0,0,0,1,0,1"], "USAGE", "nine numbers");
+    render("missing.glb", &["--pose", "0,0,0,0,0,1,0,0,1"], "USAGE", "nine numbers");
     render("builtin:cornell", &["--set", "colour=1"], "UNKNOWN_NAME", "colour");
     render("builtin:cornell", &["--set", "film.exposure=bright"], "BAD_VALUE", "exposure");
     render("builtin:many", &[], "UNKNOWN_NAME", "many-lights:N");

@@ -4,6 +4,7 @@
 use restir::lab::settings;
 use restir::lab::truth::Trial;
 use restir::params::{FilmParams, ParamKind, ParamSpec, Params, RenderParams};
+use restir::techniques::presets::{self, Preset};
 use restir::techniques::{self, TechniqueInfo};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -71,12 +72,27 @@ fn parameter_table(prefix: &str, specs: &[ParamSpec]) -> String {
     table
 }
 
+/// A Markdown table of presets.
+fn preset_table() -> String {
+    let mut table = String::from("| preset | technique | settings | stands for |\n|---|---|---|---|\n");
+    for Preset { id, title, doc, technique, settings } in presets::ALL {
+        let settings: Vec<String> = settings.iter().map(|(key, value)| format!("`{key}={value}`")).collect();
+        let doc = doc.replace('|', "\\|");
+        table += &format!(
+            "| `{id}` | [{technique}](techniques/{technique}.md) | {} | {title}. {doc} |\n",
+            settings.join(", ")
+        );
+    }
+    table
+}
+
 /// Every generated table with the page it belongs to and its name there.
 fn tables() -> Vec<(PathBuf, &'static str, &'static str, String)> {
     let global = root().join("docs/parameters.md");
     let mut tables = vec![
         (global.clone(), "parameters", "render", parameter_table("render.", RenderParams::SPECS)),
-        (global, "parameters", "film", parameter_table("film.", FilmParams::SPECS)),
+        (global.clone(), "parameters", "film", parameter_table("film.", FilmParams::SPECS)),
+        (global, "presets", "all", preset_table()),
     ];
     tables.extend(techniques::ALL.iter().map(|info| {
         let views = info.views.iter().map(|v| format!("`{v}`")).collect::<Vec<_>>().join(", ");

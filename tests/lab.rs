@@ -203,6 +203,30 @@ fn what_makes_no_sense_is_refused() {
         ("[quick]", "[[sweep]]\nkey = \"light_samples\"\nvalues = [1]\n[quick]", "UNKNOWN_NAME", "light_samples"),
         ("[quick]", "[[sweep]]\nkey = \"scene\"\nvalues = [\"x\"]\n[quick]", "BAD_FILE", "'*'"),
         ("[quick]", "[[sweep]]\nkey = \"size\"\nvalues = [\"640\"]\n[quick]", "BAD_FILE", "WIDTHxHEIGHT"),
+        ("[quick]", "[[sweep]]\nkey = \"indirect\"\nvalues = [true]\n[quick]", "BAD_FILE", "'indirect' is swept"),
+        ("[quick]", "[[sweep]]\nkey = \"render.seed\"\nvalues = [4, 4]\n[quick]", "BAD_FILE", "twice"),
+        ("metrics = [\"mse\",", "metrics = [\"mse\", \"mse\",", "BAD_FILE", "twice"),
+        ("name = \"restir-di\"", "name = \"\"", "BAD_FILE", "empty name"),
+        ("\"builtin:cornell\"", "\"builtin:cornell\"\n[[scene]]\nname = \"builtin:cornell\"", "BAD_FILE", "twice"),
+        (
+            "\"builtin:cornell\"",
+            "\"builtin:cornell\"\ncamera = { from = [0, 1, 2], to = [0, 1, 2], fov = 40 }",
+            "BAD_FILE",
+            "two places",
+        ),
+        (
+            "\"builtin:cornell\"",
+            "\"builtin:cornell\"\ncamera = { from = [0, nan, 2], to = [0, 1, 0], fov = 40 }",
+            "BAD_FILE",
+            "finite",
+        ),
+        (
+            "\"builtin:cornell\"",
+            "\"builtin:cornell\"\ncamera = { from = [0, 1, 2], to = [0, 1, 0], fov = 200 }",
+            "BAD_FILE",
+            "180 degrees",
+        ),
+        ("[quick]", "[motion]\nspeed = nan\n[quick]", "BAD_FILE", "finite"),
     ];
     for (old, new, code, word) in cases {
         assert_eq!(TINY.matches(old).count(), 1, "{old}");
@@ -312,6 +336,9 @@ fn an_experiment_writes_whole_files_once_and_goes_on_from_what_it_has() {
     let points = out.names("points").into_iter().filter(|name| name.ends_with(".json")).collect::<Vec<_>>();
     std::fs::write(out.0.join("points").join(&points[0]), "{").unwrap();
     assert_eq!(run(&out.0, &cache.0, &experiment, false).0.measured, 1);
+    let tiles = out.names("points").into_iter().filter(|name| name.ends_with(".png")).collect::<Vec<_>>();
+    tiles.iter().for_each(|name| std::fs::write(out.0.join("points").join(name), "").unwrap());
+    assert_eq!(run(&out.0, &cache.0, &experiment, false).0.measured, 2, "the pictures of the first run");
     // More runs: those that are there are kept.
     assert_eq!(run(&out.0, &cache.0, &Experiment { runs: 3, ..experiment.clone() }, false).0.measured, 2);
     let (outcome, heard) = run(&out.0, &cache.0, &experiment, true);

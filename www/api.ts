@@ -34,12 +34,24 @@ export interface SceneInfo {
   example: string;
 }
 
+/** Settings that go by a name: those of a paper. */
+export interface Preset {
+  id: string;
+  title: string;
+  /** What it stands for, and what it leaves out. */
+  doc: string;
+  technique: string;
+  /** Values by key; all others are at their defaults. */
+  settings: Record<string, string>;
+}
+
 /** What `describe()` returns. */
 export interface Description {
   version: string;
   techniques: TechniqueInfo[];
   film: { params: Parameter[] };
   render: { params: Parameter[] };
+  presets: Preset[];
   scenes: SceneInfo[];
 }
 
@@ -54,6 +66,9 @@ export interface Camera {
   vertical_fov?: number;
   half_height?: number;
 }
+
+/** Where a camera is and where it looks, in the scene's units; the directions need not be of length 1. */
+export type Pose = Pick<Camera, 'position' | 'forward' | 'up'>;
 
 /** What `Viewer.stats()` resolves to: rays and passes of the last frame, `nan` and `inf` since the picture began. */
 export interface Stats {

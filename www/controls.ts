@@ -35,15 +35,19 @@ export class Controls {
   constructor(
     private readonly canvas: HTMLCanvasElement,
     private readonly camera: OrbitCamera,
+    /** Ends listening when it is aborted. */
+    signal: AbortSignal,
   ) {
-    canvas.addEventListener('pointerdown', (event) => this.down(event));
-    canvas.addEventListener('pointermove', (event) => this.drag(event));
-    for (const type of ['pointerup', 'pointercancel'] as const) canvas.addEventListener(type, (event) => this.pointers.delete(event.pointerId));
-    canvas.addEventListener('contextmenu', (event) => event.preventDefault());
-    canvas.addEventListener('wheel', (event) => this.wheel(event), { passive: false });
-    canvas.addEventListener('keydown', (event) => this.key(event, true));
-    canvas.addEventListener('keyup', (event) => this.key(event, false));
-    canvas.addEventListener('blur', () => this.pressed.clear());
+    const listen = <Type extends keyof HTMLElementEventMap>(type: Type, heard: (event: HTMLElementEventMap[Type]) => void) =>
+      canvas.addEventListener(type, heard, { signal, passive: false });
+    listen('pointerdown', (event) => this.down(event));
+    listen('pointermove', (event) => this.drag(event));
+    for (const type of ['pointerup', 'pointercancel'] as const) listen(type, (event) => this.pointers.delete(event.pointerId));
+    listen('contextmenu', (event) => event.preventDefault());
+    listen('wheel', (event) => this.wheel(event));
+    listen('keydown', (event) => this.key(event, true));
+    listen('keyup', (event) => this.key(event, false));
+    listen('blur', () => this.pressed.clear());
   }
 
   /** Applies held keys over `seconds`; returns whether the camera moved since the last call. */

@@ -22,7 +22,20 @@ export async function readDropped(files: readonly File[]): Promise<{ source?: Sc
 
 /** What the address or the menu calls: a name that the module knows, or the address of a map. */
 export function surroundingsOf(text: string): Surroundings {
-  return /^(sky|white)(:|$)/.test(text) ? { name: text } : { name: text, address: new URL(text, location.href).href };
+  return /^(sky|white)(:|$)/.test(text) ? { name: text } : { name: text, address: new URL(text, document.baseURI).href };
+}
+
+/**
+ * What `scene=` in an address and `src` of an element call. With a dot or a slash it is the address of a .glb, .gltf, .obj or
+ * .restir, relative to the document; else a built-in scene, with or without `builtin:` as on the command line.
+ */
+export function sourceOf(text: string): SceneSource {
+  const builtin = /^builtin:/.test(text);
+  if (builtin || !/[./]/.test(text)) return { kind: 'builtin', name: builtin ? text.slice('builtin:'.length) : text };
+  if (!URL.canParse(text, document.baseURI)) throw { code: 'BAD_VALUE', message: `${text} is no address.` };
+  const { href, pathname, protocol } = new URL(text, document.baseURI);
+  const name = protocol === 'data:' ? 'data' : pathname.slice(pathname.lastIndexOf('/') + 1) || text;
+  return { kind: 'address', name, address: href, choice: {} };
 }
 
 /** The scene among `files`: a .glb, .gltf, .obj or .restir. Throws NOT_A_SCENE. The worker reads them. */

@@ -4,15 +4,15 @@ import type { LoadRequest, LoadResponse, Loaded } from './protocol.js';
 export type Progress = (fraction: number, what: string) => void;
 
 export class SceneLoader {
-  private worker: Worker | undefined = SceneLoader.spawn();
+  private worker: Worker | undefined;
   /** Rejects the load that is running. */
   private abandon: ((failure: { code: string; message: string }) => void) | undefined;
 
   /** Resolves to the scene, or rejects with a `Failure`. A load still running is abandoned: it rejects with CANCELLED. */
   async load(request: Promise<WebAssembly.Module>, rest: Omit<LoadRequest, 'module'>, progress: Progress): Promise<Loaded> {
-    // The first worker starts with the page, so that its scripts load while the wasm module compiles.
     this.cancel();
-    const worker = (this.worker ??= SceneLoader.spawn());
+    // Now, so that its scripts load while the wasm module compiles.
+    const worker = (this.worker = SceneLoader.spawn());
     return new Promise((resolve, reject) => {
       this.abandon = reject;
       worker.onmessage = ({ data }: MessageEvent<LoadResponse>) => {

@@ -26,6 +26,7 @@ const known: Record<string, { title: string; advice: string }> = {
     advice: 'The driver was reset, or ran out of memory. Restart; if it happens again, lower the resolution scale.',
   },
   SHADER: { title: 'A shader does not compile here', advice: 'This is a fault of restir: please report it with the text above.' },
+  CLIPBOARD: { title: 'The browser does not let the page copy', advice: 'Copy the text above by hand.' },
   BAD_FILE: { title: 'This file is broken', advice: 'Export it again, or check it with the Khronos glTF validator.' },
   UNSUPPORTED: { title: 'This file needs something restir does not have', advice: 'Export it without that extension.' },
   UNKNOWN_NAME: { title: 'Unknown name', advice: 'Choose one from the menus.' },
@@ -34,6 +35,18 @@ const known: Record<string, { title: string; advice: string }> = {
   WORKER: { title: 'Loading stopped', advice: 'Reload the page; if the scene is large, try a smaller one.' },
   NOT_A_SCENE: { title: 'This is not a scene', advice: 'Drop a .glb or .restir file, or a .gltf or .obj together with the files that it names. An environment map is an .hdr or .exr file.' },
 };
+
+/** A failure as what a promise rejects with. */
+export class RestirError extends Error {
+  /** Stable: one of the keys of `known` above, `CANCELLED`, `DISPOSED` or `INTERNAL`. */
+  readonly code: string;
+
+  constructor({ code, message }: Failure) {
+    super(message);
+    this.name = 'RestirError';
+    this.code = code;
+  }
+}
 
 /** Any thrown value as a `Failure`. */
 export function toFailure(error: unknown): Failure {

@@ -1,5 +1,6 @@
 // The settings panel, generated from the parameter declarations.
 import type { Parameter } from './api.js';
+import { isDefault } from './description.js';
 
 export interface Group {
   title: string;
@@ -10,11 +11,6 @@ export interface Group {
 
 /** Tells of a new value, or with undefined of a return to the default. */
 export type ParameterChanged = (key: string, value: string | undefined) => void;
-
-/** Whether `text` says the same as the parameter's default. */
-export function isDefault(parameter: Parameter, text: string): boolean {
-  return typeof parameter.default === 'number' ? Number(text) === parameter.default : text === String(parameter.default);
-}
 
 function make<Tag extends keyof HTMLElementTagNameMap>(tag: Tag, properties: Partial<HTMLElementTagNameMap[Tag]>): HTMLElementTagNameMap[Tag] {
   return Object.assign(document.createElement(tag), properties);
@@ -111,6 +107,16 @@ function row(key: string, parameter: Parameter, value: string | undefined, chang
   const whole = make('div', { className: 'parameter', title: parameter.doc });
   whole.append(label, ...elements, back, doc);
   return whole;
+}
+
+/** Shows only those parameters whose name or text has all words of `text`. */
+export function filterPanel(root: HTMLElement, text: string): void {
+  const words = text.toLowerCase().split(/\s+/);
+  for (const fieldset of root.querySelectorAll('fieldset')) {
+    const rows = [...fieldset.querySelectorAll<HTMLElement>('.parameter')];
+    for (const row of rows) row.hidden = !words.every((word) => row.textContent?.toLowerCase().includes(word));
+    fieldset.hidden = rows.every((row) => row.hidden);
+  }
 }
 
 /** Shows `groups` in `root`, with the `values` that differ from their defaults. */

@@ -7,8 +7,11 @@ export interface Choice {
   variant?: string;
 }
 
-/** Where a scene comes from: a built-in by name, or a scene file with the files that lie beside it. */
-export type SceneSource = { kind: 'builtin'; name: string } | { kind: 'file'; name: string; files: File[]; choice: Choice };
+/** Where a scene comes from: a built-in by name, a scene file with the files that lie beside it, or such a file's address. */
+export type SceneSource =
+  | { kind: 'builtin'; name: string }
+  | { kind: 'file'; name: string; files: File[]; choice: Choice }
+  | { kind: 'address'; name: string; address: string; choice: Choice };
 
 /** What can be chosen in a glTF file. */
 export interface Contents {

@@ -1,7 +1,10 @@
 // One frame in flight, and nobody else on the viewer while it is: every other call waits in a queue between frames.
 import type { Viewer } from './pkg/restir.js';
 
-type Work = (viewer: Viewer) => Promise<void>;
+interface Work {
+  run(viewer: Viewer): Promise<void>;
+  refuse(reason: unknown): void;
+}
 
 const nextAnimationFrame = () => new Promise<number>((resolve) => requestAnimationFrame(resolve));
 
@@ -9,29 +12,50 @@ export interface LoopEvents {
   /** Before each frame, with the seconds since the last call. Returns whether the picture must change. */
   beforeFrame(viewer: Viewer, seconds: number): boolean;
   /** After each frame, with the milliseconds from its first command to an idle device. */
-  afterFrame(viewer: Viewer, milliseconds: number): Promise<void>;
+  afterFrame(viewer: Viewer, milliseconds: number): void;
   /** A frame failed. The loop has let go of the viewer. */
   failed(error: unknown): void;
 }
 
 export class RenderLoop {
   paused = false;
+  /** While nobody sees the picture no frame is rendered; calls are still made. */
+  suspended = false;
   /** Stops after so many accumulated frames, until something changes. */
   frameLimit = Infinity;
   private viewer: Viewer | undefined;
   private readonly queue: Work[] = [];
   private changed = false;
+  /** Why there will be no viewer, until one is attached all the same. */
+  private stopped: unknown;
+  private ended = false;
   /** Frames since the last change: where frames are not averaged, the viewer's own count stays at 1. */
   private frames = 0;
 
+  private readonly running: Promise<void>;
+
   constructor(private readonly events: LoopEvents) {
-    void this.run();
+    this.running = this.run();
   }
 
   /** Renders with `viewer` from now on. */
   attach(viewer: Viewer): void {
     this.viewer = viewer;
+    this.stopped = undefined;
     this.changed = true;
+  }
+
+  /** Rejects with `reason` all calls that wait, and those to come. */
+  stop(reason: unknown): void {
+    this.stopped = reason;
+    for (const { refuse } of this.queue.splice(0)) refuse(reason);
+  }
+
+  /** Stops for good. Resolves when nothing uses the viewer any more. */
+  async end(reason: unknown): Promise<void> {
+    this.ended = true;
+    this.stop(reason);
+    await this.running;
   }
 
   /** Renders one frame even while paused. */
@@ -41,22 +65,26 @@ export class RenderLoop {
 
   /** Runs `work` between two frames. Resolves or rejects as `work` does. */
   call<T>(work: (viewer: Viewer) => T | Promise<T>): Promise<T> {
-    return new Promise((resolve, reject) => {
-      this.queue.push(async (viewer) => {
+    if (this.stopped !== undefined) return Promise.reject(this.stopped);
+    return new Promise((resolve, refuse) => {
+      const run = async (viewer: Viewer) => {
         try {
           resolve(await work(viewer));
         } catch (error) {
-          reject(error);
+          refuse(error);
         }
-      });
+      };
+      this.queue.push({ run, refuse });
     });
   }
 
   /** As `call`, for what makes the picture start again: renders a frame even while paused. */
   change<T>(work: (viewer: Viewer) => T | Promise<T>): Promise<T> {
-    return this.call((viewer) => {
+    return this.call(async (viewer) => {
+      const result = await work(viewer);
+      // What failed has changed nothing.
       this.changed = true;
-      return work(viewer);
+      return result;
     });
   }
 
@@ -65,19 +93,20 @@ export class RenderLoop {
     return Math.max(viewer.frames(), this.frames) >= this.frameLimit;
   }
 
-  private async run(): Promise<never> {
+  private async run(): Promise<void> {
     let last = performance.now();
-    for (;;) {
+    while (!this.ended) {
       const now = await nextAnimationFrame();
       const seconds = Math.min(Math.max(now - last, 0) / 1000, 0.1);
       last = now;
-      if (this.viewer) await this.turn(this.viewer, seconds);
+      if (this.viewer && !this.ended) await this.turn(this.viewer, seconds);
     }
   }
 
   private async turn(viewer: Viewer, seconds: number): Promise<void> {
     try {
-      for (let work = this.queue.shift(); work; work = this.queue.shift()) await work(viewer);
+      for (let work = this.queue.shift(); work; work = this.queue.shift()) await work.run(viewer);
+      if (this.suspended) return;
       const changed = this.events.beforeFrame(viewer, seconds) || this.changed;
       if (changed) this.frames = 0;
       else if (this.paused || this.isComplete(viewer)) return;
@@ -86,7 +115,7 @@ export class RenderLoop {
       const start = performance.now();
       viewer.render();
       await viewer.idle();
-      await this.events.afterFrame(viewer, performance.now() - start);
+      this.events.afterFrame(viewer, performance.now() - start);
     } catch (error) {
       this.viewer = undefined;
       this.events.failed(error);

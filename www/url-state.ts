@@ -1,8 +1,12 @@
-// The page's state in the URL's query, so that a link is a picture. Keys of parameters are those of the CLI's --set.
-import type { Camera, Vector } from './api.js';
+// What determines a picture, and how a URL's query says it, so that a link is a picture. Keys of parameters are those of --set.
+import type { Pose, Vector } from './api.js';
 
-export interface PageState {
-  /** A built-in scene's name; undefined for a file of the user's. */
+/** What a command line renders by default, too. */
+export const defaultTechnique = 'restir-di';
+
+/** All that determines a picture but the files of the user's. */
+export interface Settings {
+  /** A built-in scene's name, or a file's address; undefined for a file of the user's. */
   scene: string | undefined;
   /** What surrounds the scene: `sky...`, `white`, or the address of a map; undefined for its own, or a file of the user's. */
   environment: string | undefined;
@@ -22,7 +26,7 @@ export interface PageState {
   /** Index or name among the scene's cameras. */
   camera: string;
   /** Where the user has moved to, if they have. */
-  pose: Pick<Camera, 'position' | 'forward' | 'up'> | undefined;
+  pose: Pose | undefined;
   /** Render size in pixels; undefined follows the window. */
   size: [number, number] | undefined;
   /** Rendered pixels per device pixel, along one side; undefined adapts. */
@@ -33,10 +37,10 @@ export interface PageState {
   values: Map<string, string>;
 }
 
-export const defaultState = (technique: string): PageState => ({
+export const defaultSettings = (): Settings => ({
   scene: 'cornell',
   environment: undefined,
-  technique,
+  technique: defaultTechnique,
   view: 'radiance',
   seed: 0,
   accumulate: undefined,
@@ -81,17 +85,19 @@ function accumulate(text: string): boolean {
   return text === 'yes';
 }
 
-function pose(text: string): PageState['pose'] {
+/** Nine numbers with commas between: position, forward, up. Throws what is wrong with them. */
+export function poseOf(text: string): Pose {
   const numbers = text.split(',').map(Number);
   if (numbers.length !== 9 || !numbers.every(Number.isFinite)) throw new Error('must be nine numbers: position, forward, up');
   const vector = (at: number) => numbers.slice(at, at + 3) as Vector;
   return { position: vector(0), forward: vector(3), up: vector(6) };
 }
 
-const poseText = ({ position, forward, up }: NonNullable<PageState['pose']>) =>
+/** What `poseOf` reads. */
+export const poseText = ({ position, forward, up }: Pose) =>
   [...position, ...forward, ...up].map((value) => String(Number(value.toPrecision(5)))).join(',');
 
-const readers: Record<string, (state: PageState, text: string) => void> = {
+const readers: Record<string, (state: Settings, text: string) => void> = {
   scene: (state, text) => (state.scene = text),
   environment: (state, text) => (state.environment = text),
   technique: (state, text) => (state.technique = text),
@@ -103,15 +109,15 @@ const readers: Record<string, (state: PageState, text: string) => void> = {
   speed: (state, text) => (state.speed = finite(text)),
   animation: (state, text) => (state.animation = text),
   camera: (state, text) => (state.camera = text),
-  pose: (state, text) => (state.pose = pose(text)),
+  pose: (state, text) => (state.pose = poseOf(text)),
   size: (state, text) => (state.size = size(text)),
   scale: (state, text) => (state.scale = scale(text)),
   frames: (state, text) => (state.frames = integer(text, 1, 0xffffffff)),
 };
 
 /** Reads a query. Keys that are none of the page's are taken for parameters; what cannot be read becomes a warning. */
-export function readQuery(query: string, technique: string): { state: PageState; warnings: string[] } {
-  const state = defaultState(technique);
+export function readQuery(query: string): { state: Settings; warnings: string[] } {
+  const state = defaultSettings();
   const warnings: string[] = [];
   for (const [key, text] of new URLSearchParams(query)) {
     const read = Object.hasOwn(readers, key) ? readers[key] : undefined;
@@ -126,8 +132,8 @@ export function readQuery(query: string, technique: string): { state: PageState;
 }
 
 /** The query for `state`, with only what differs from the defaults; empty where nothing does. */
-export function writeQuery(state: PageState, technique: string): string {
-  const defaults = defaultState(technique);
+export function writeQuery(state: Settings): string {
+  const defaults = defaultSettings();
   const query = new URLSearchParams();
   const put = (key: string, value: string | number | undefined, standard: string | number | undefined) => {
     if (value !== undefined && value !== standard) query.set(key, String(value));

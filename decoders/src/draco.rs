@@ -1,6 +1,5 @@
 //! Draco triangle meshes, as `KHR_draco_mesh_compression` embeds them.
 
-use crate::words::u32_at;
 use crate::{Result, broken};
 use draco_core::draco_types::DataType;
 use draco_core::{DecodeLimits, DecoderBuffer, MeshDecoder, PointIndex};
@@ -77,44 +76,4 @@ fn component_type(of: DataType) -> Result<u32> {
         DataType::Float32 => 5126,
         other => return Err(broken(format!("Draco: an attribute of {other:?}, which glTF does not have"))),
     })
-}
-
-impl Mesh {
-    /// The mesh as bytes that [`Mesh::from_bytes`] reads: how it gets from one wasm module to another. Words of 32 bits,
-    /// little-endian: vertices, number of indices and of attributes; the indices; then each attribute's id, component
-    /// type, components and number of bytes, followed by these.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        let attributes = self.attributes.iter().map(|attribute| 16 + attribute.values.len()).sum::<usize>();
-        let mut out = Vec::with_capacity(12 + self.indices.len() * 4 + attributes);
-        let word = |out: &mut Vec<u8>, value: u32| out.extend(value.to_le_bytes());
-        word(&mut out, self.vertices);
-        word(&mut out, self.indices.len() as u32);
-        word(&mut out, self.attributes.len() as u32);
-        self.indices.iter().for_each(|&index| word(&mut out, index));
-        for attribute in &self.attributes {
-            let size = attribute.values.len() as u32;
-            [attribute.id, attribute.component_type, attribute.components, size]
-                .into_iter()
-                .for_each(|value| word(&mut out, value));
-            out.extend_from_slice(&attribute.values);
-        }
-        out
-    }
-
-    /// What [`Mesh::to_bytes`] wrote, or none.
-    pub fn from_bytes(bytes: &[u8]) -> Option<Mesh> {
-        let (vertices, indices, attributes) = (u32_at(bytes, 0)?, u32_at(bytes, 4)? as usize, u32_at(bytes, 8)?);
-        let (indices, mut rest) = bytes.get(12..)?.split_at_checked(indices.checked_mul(4)?)?;
-        let indices = indices.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
-        let attributes = (0..attributes)
-            .map(|_| {
-                let word = |i: usize| u32_at(rest, 4 * i);
-                let (id, component_type, components, size) = (word(0)?, word(1)?, word(2)?, word(3)?);
-                let (values, after) = rest.get(16..)?.split_at_checked(size as usize)?;
-                rest = after;
-                Some(Attribute { id, component_type, components, values: values.to_vec() })
-            })
-            .collect::<Option<_>>()?;
-        Some(Mesh { vertices, indices, attributes })
-    }
 }

@@ -1,8 +1,7 @@
 //! The decoders that only some files need: Draco and meshopt geometry; PNG, JPEG, WebP and Basis Universal pictures; OpenEXR
 //! and Radiance maps; Wavefront OBJ.
 //!
-//! Native programs link them. The page keeps them in a wasm module of their own, which its Worker fetches when a file
-//! asks for one, so that nobody else downloads them.
+//! They are a crate of their own so that they can be compiled, checked and fuzzed by themselves.
 //!
 //! Nothing in a file is trusted: what a decoder may produce is bounded by the caller, and checked before it is allocated.
 
@@ -11,8 +10,6 @@ pub mod exr;
 mod ktx2;
 pub mod map;
 pub mod meshopt;
-#[cfg(all(target_arch = "wasm32", feature = "module"))]
-mod module;
 pub mod obj;
 pub mod picture;
 mod words;

@@ -1,6 +1,5 @@
 //! Maps of radiance: OpenEXR in [`crate::exr`], Radiance here.
 
-use crate::words::u32_at;
 use crate::{Fault, Result, broken};
 use image::codecs::hdr::{HdrDecoder, SIGNATURE};
 use image::{ImageDecoder, ImageError};
@@ -70,41 +69,4 @@ fn decode_radiance(bytes: &[u8]) -> Result<Map> {
 /// A message of the decoder, which may quote the file.
 fn one_line(message: &dyn std::fmt::Display) -> String {
     message.to_string().chars().map(|c| if c.is_control() { ' ' } else { c }).take(160).collect()
-}
-
-impl Map {
-    /// The map as bytes that [`Map::from_bytes`] reads: pixels, width, height.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        let mut out = bytemuck::cast_slice(&self.pixels).to_vec();
-        out.extend(self.width.to_le_bytes());
-        out.extend(self.height.to_le_bytes());
-        out
-    }
-
-    /// What [`Map::to_bytes`] wrote, or none.
-    pub fn from_bytes(bytes: &[u8]) -> Option<Map> {
-        let (texels, sides) = bytes.split_at_checked(bytes.len().checked_sub(8)?)?;
-        let (width, height) = (u32_at(sides, 0)?, u32_at(sides, 4)?);
-        let size = u64::from(width) * u64::from(height) * 12;
-        (size == texels.len() as u64 && size > 0).then(|| Map {
-            width,
-            height,
-            pixels: bytemuck::pod_collect_to_vec(texels),
-        })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn maps_pass_as_bytes() {
-        let map = Map { width: 2, height: 1, pixels: vec![[1.0, 2.0, 3.0], [0.5, 0.25, 1e9]] };
-        let bytes = map.to_bytes();
-        assert_eq!(Map::from_bytes(&bytes), Some(map));
-        assert_eq!(Map::from_bytes(&bytes[1..]), None);
-        assert_eq!(Map::from_bytes(&[0; 8]), None);
-        assert_eq!(Map::from_bytes(&[]), None);
-    }
 }

@@ -114,22 +114,3 @@ fn check_frames(mut chunks: &[u8], outermost: bool, limits: Limits) -> Result<()
     }
     Ok(())
 }
-
-impl Picture {
-    /// The picture as bytes that [`Picture::from_bytes`] reads: pixels, width, height.
-    pub fn into_bytes(self) -> Vec<u8> {
-        let mut out = self.pixels;
-        out.extend(self.width.to_le_bytes());
-        out.extend(self.height.to_le_bytes());
-        out
-    }
-
-    /// What [`Picture::into_bytes`] wrote, or none.
-    pub fn from_bytes(mut bytes: Vec<u8>) -> Option<Picture> {
-        let end = bytes.len().checked_sub(8)?;
-        let (width, height) = (u32_at(&bytes, end)?, u32_at(&bytes, end + 4)?);
-        bytes.truncate(end);
-        let size = u64::from(width) * u64::from(height) * 4;
-        (size == bytes.len() as u64).then_some(Picture { width, height, pixels: bytes })
-    }
-}

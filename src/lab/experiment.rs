@@ -73,7 +73,7 @@ fn default_technique() -> String {
 }
 
 /// A scene and where it is seen from.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Place {
     /// A file or `builtin:NAME`; `*` stands for the value of a sweep over `scene`.
@@ -249,6 +249,12 @@ pub struct Motion {
     pub time: f64,
 }
 
+impl Motion {
+    fn is_finite(&self) -> bool {
+        self.camera_step.iter().all(|step| step.is_finite()) && self.speed.is_finite() && self.time.is_finite()
+    }
+}
+
 /// What a quick run does less of.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -378,6 +384,9 @@ impl Experiment {
         if self.size.iter().any(|side| !(1..=MAX_SIDE).contains(side)) {
             return bad("size", format!("each side is 1 to {MAX_SIDE} pixels"));
         }
+        if self.motion.as_ref().is_some_and(|motion| !motion.is_finite()) {
+            return bad("motion", "every number has to be finite".into());
+        }
         if self.metrics.is_empty() {
             return bad("metrics", "there is none".into());
         }
@@ -395,6 +404,28 @@ impl Experiment {
         }
         if self.sweeps.get(1).is_some_and(|sweep| ["scene", "size"].contains(&sweep.key.as_str())) {
             return bad("sweep", "scenes and sizes can be swept first only".into());
+        }
+        let keys: Vec<&str> = self.sweeps.iter().map(|sweep| sweep.key.as_str()).collect();
+        let settings =
+            self.scenes.iter().map(|place| &place.settings).chain(self.series.iter().map(|series| &series.settings));
+        for (key, settings) in
+            keys.iter().flat_map(|key| settings.clone().chain([&self.settings]).map(move |all| (*key, all)))
+        {
+            if settings.contains_key(key) {
+                return bad("sweep", format!("'{key}' is swept, and set by [settings], a scene or a series as well"));
+            }
+        }
+        if has_twins(&keys) || self.sweeps.iter().any(|sweep| has_twins(&sweep.values)) {
+            return bad("sweep", "the same key or value stands there twice".into());
+        }
+        if has_twins(&self.metrics) {
+            return bad("metrics", "one stands there twice".into());
+        }
+        if has_twins(&self.scenes) {
+            return bad("scene", "the same one stands there twice".into());
+        }
+        if self.series.iter().any(|series| series.name.is_empty()) {
+            return bad("series", "one has an empty name".into());
         }
         if self.axis() == Axis::Sweep && self.sweeps.is_empty() {
             return bad("x", "there is no sweep".into());
@@ -448,6 +479,9 @@ impl Experiment {
 
     /// Whether scene names can be right; what is in a file is seen when it is read.
     fn check_scene(&self, name: &str, place: &Place) -> Result<()> {
+        if let View::LookAt(view) = &place.camera {
+            view.check().map_err(|what| Error::bad_file(name, "scene.camera", what))?;
+        }
         let swept = self.sweeps.first().filter(|sweep| sweep.key == "scene");
         let names: Vec<String> = match swept {
             Some(sweep) => sweep.values.iter().map(|value| place.name.replace('*', &value.0)).collect(),
@@ -483,4 +517,9 @@ pub(super) fn parse_size(name: &str, value: &Value) -> Result<[u32; 2]> {
     sides
         .filter(|sides: &[u32; 2]| sides.iter().all(|side| (1..=MAX_SIDE).contains(side)))
         .ok_or_else(|| Error::bad_file(name, "sweep", format!("'{value}' is no size, WIDTHxHEIGHT up to {MAX_SIDE}")))
+}
+
+/// Whether two are alike.
+fn has_twins<T: PartialEq>(list: &[T]) -> bool {
+    list.iter().enumerate().any(|(i, one)| list[..i].contains(one))
 }

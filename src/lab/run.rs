@@ -215,8 +215,11 @@ impl Lab<'_> {
                 let numbers = self.points_folder.join(format!("{name}.json"));
                 let tile = self.points_folder.join(format!("{name}{}.png", view.unwrap_or_default().replace(' ', "-")));
                 // The strip shows the first run.
-                let kept =
-                    if self.options.fresh || (number == 0 && !tile.exists()) { None } else { Run::read(&numbers) };
+                let kept = if self.options.fresh || (number == 0 && !strip::is_whole(&tile)) {
+                    None
+                } else {
+                    Run::read(&numbers)
+                };
                 let run = match kept {
                     Some(run) => {
                         self.outcome.kept += 1;

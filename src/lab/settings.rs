@@ -105,6 +105,21 @@ pub struct LookAt {
     pub fov: f32,
 }
 
+impl LookAt {
+    /// Whether there is such a camera; if not, why.
+    pub(super) fn check(&self) -> std::result::Result<(), String> {
+        let LookAt { from, to, fov } = self;
+        if from == to || !from.iter().chain(to).all(|value| value.is_finite()) {
+            return Err("from and to have to be two places, and every number finite".into());
+        }
+        // The range of a camera's angle.
+        if !(*fov > 0.0 && *fov < 180.0) {
+            return Err(format!("fov = {fov} is not between 0 and 180 degrees"));
+        }
+        Ok(())
+    }
+}
+
 impl Default for View {
     fn default() -> Self {
         View::Index(0)

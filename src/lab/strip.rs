@@ -71,11 +71,7 @@ pub fn tile(image: &Image, Exposure(gain): Exposure) -> Tile {
 pub fn write(path: &Path, tiles: &[PathBuf]) -> Result<()> {
     let mut pictures = Vec::new();
     for tile in tiles {
-        let name = tile.display().to_string();
-        let bytes = std::fs::read(tile).map_err(|source| Error::Io { path: name.clone(), source })?;
-        let picture = image::load_from_memory_with_format(&bytes, image::ImageFormat::Png)
-            .map_err(|error| Error::bad_file(name, "picture", error.to_string()))?;
-        pictures.push(picture.to_rgba8());
+        pictures.push(read_tile(tile)?);
     }
     let side = |f: fn(&image::RgbaImage) -> u32| pictures.iter().map(f).max().unwrap_or(1);
     let [width, height] = [side(image::RgbaImage::width), side(image::RgbaImage::height)];
@@ -87,6 +83,19 @@ pub fn write(path: &Path, tiles: &[PathBuf]) -> Result<()> {
         image::imageops::replace(&mut sheet, picture, x.into(), y.into());
     }
     write_atomic(path, &encode_png(sheet.width(), sheet.height(), sheet.as_raw())?)
+}
+
+fn read_tile(path: &Path) -> Result<image::RgbaImage> {
+    let name = path.display().to_string();
+    let bytes = std::fs::read(path).map_err(|source| Error::Io { path: name.clone(), source })?;
+    let picture = image::load_from_memory_with_format(&bytes, image::ImageFormat::Png)
+        .map_err(|error| Error::bad_file(name, "picture", error.to_string()))?;
+    Ok(picture.to_rgba8())
+}
+
+/// Whether a tile is there, and whole.
+pub fn is_whole(path: &Path) -> bool {
+    read_tile(path).is_ok()
 }
 
 /// How many tiles stand in a row.

@@ -11,7 +11,6 @@ pub const MAX_RADIANCE: f32 = 1.0e8;
 ///
 /// # Errors
 /// [`Error::Io`] where it cannot be read, else as [`decode`].
-#[cfg(not(target_arch = "wasm32"))]
 pub fn load_file(path: &std::path::Path) -> Result<(Environment, u64)> {
     decode_counting(&path.display().to_string(), &super::files::read(path, 2 << 30)?)
 }
@@ -20,7 +19,6 @@ pub fn load_file(path: &std::path::Path) -> Result<(Environment, u64)> {
 ///
 /// # Errors
 /// As [`load_file`].
-#[cfg(not(target_arch = "wasm32"))]
 pub fn surround_by_file(scene: &mut Scene, path: &std::path::Path) -> Result<()> {
     surround(scene, &path.display().to_string(), &super::files::read(path, 2 << 30)?)
 }
@@ -29,7 +27,6 @@ pub fn surround_by_file(scene: &mut Scene, path: &std::path::Path) -> Result<()>
 ///
 /// # Errors
 /// As [`decode`].
-#[cfg(not(target_arch = "wasm32"))]
 pub fn surround(scene: &mut Scene, name: &str, bytes: &[u8]) -> Result<()> {
     surround_by(scene, name, decode_map(name, bytes)?)
 }
@@ -61,7 +58,6 @@ pub fn surround_by(scene: &mut Scene, name: &str, map: Map) -> Result<()> {
 /// [`Error::BadFile`] for a file that is neither, or broken, or of which most values are negative or no numbers;
 /// [`Error::Unsupported`] for pixels of another kind; [`Error::Limit`] for more than [`MAX_TEXELS`]. `name` is the file in
 /// these.
-#[cfg(not(target_arch = "wasm32"))]
 pub fn decode(name: &str, bytes: &[u8]) -> Result<Environment> {
     decode_counting(name, bytes).map(|(environment, _)| environment)
 }
@@ -70,12 +66,10 @@ pub fn decode(name: &str, bytes: &[u8]) -> Result<Environment> {
 ///
 /// # Errors
 /// As [`decode`].
-#[cfg(not(target_arch = "wasm32"))]
 pub fn decode_counting(name: &str, bytes: &[u8]) -> Result<(Environment, u64)> {
     repaired(name, decode_map(name, bytes)?)
 }
 
-#[cfg(not(target_arch = "wasm32"))]
 fn decode_map(name: &str, bytes: &[u8]) -> Result<Map> {
     restir_decoders::map::decode(bytes).map_err(|fault| Error::of_fault(name, fault))
 }

@@ -8,7 +8,6 @@ pub mod area_light;
 pub mod builtin;
 pub mod bvh;
 pub mod environment;
-#[cfg(not(target_arch = "wasm32"))]
 pub mod files;
 pub mod flat;
 pub mod gltf;
@@ -16,7 +15,6 @@ pub mod gpu_types;
 pub mod intersect;
 mod lights;
 mod material;
-#[cfg(not(target_arch = "wasm32"))]
 pub mod obj;
 pub mod octahedral;
 pub mod random;

@@ -3,6 +3,7 @@
 
 use super::{Scene, files, gltf};
 use crate::error::{Error, Result};
+use restir_decoders::Fault;
 use std::path::Path;
 
 /// Loads an `.obj` file; material libraries and images are read from beside it. A library that is missing or broken is a
@@ -27,7 +28,7 @@ pub fn load_bytes(name: &str, bytes: &[u8], resolve: gltf::Resolve) -> Result<Sc
         resolve(&path).ok()
     };
     let converted = restir_decoders::obj::to_glb(bytes, &mut find).map_err(|fault| match fault {
-        gltf::Fault::Broken(what) => Error::bad_file(name, "OBJ", what),
+        Fault::Broken(what) => Error::bad_file(name, "OBJ", what),
         other => Error::of_fault(name, other),
     })?;
     let mut scene = gltf::load_bytes(name, &converted.glb, resolve)?;

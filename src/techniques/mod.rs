@@ -3,6 +3,7 @@
 pub mod candidates;
 mod normals;
 mod path_tracer;
+pub mod presets;
 mod restir_di;
 mod restir_di_decoupled;
 mod restir_report;

@@ -72,7 +72,7 @@ pub fn run(args: &Args) -> Result<()> {
     let passes = session.pass_reports();
     let report = Report {
         scene: &session.scene,
-        technique: &args.options.technique,
+        technique: session.technique,
         parameters: session.renderer.parameters(),
         size: args.options.size.to_array(),
         frames: args.frames,

@@ -107,6 +107,9 @@ fn experiments(name: &str) -> Result<Vec<(String, Experiment)>> {
 
 /// How the page is made again; folders are the reader's own.
 fn command(name: &str, args: &Args) -> String {
+    // One file of one's own is called by its path.
+    let own = args.experiment.as_deref().is_some_and(|given| given != "all" && given != name);
+    let name = if own { format!("{name}.toml") } else { name.to_owned() };
     let quick = if args.quick { " --quick" } else { "" };
     let size = args.size.map_or(String::new(), |size| format!(" --size {}x{}", size.x, size.y));
     format!("restir lab {name}{quick}{size}")

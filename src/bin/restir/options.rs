@@ -1,6 +1,6 @@
 //! Values of options, parsed.
 
-use glam::UVec2;
+use glam::{UVec2, Vec3};
 use restir::output::MAX_SIDE;
 use restir::params::{Params, RenderParams};
 use restir::{Error, Result};
@@ -38,6 +38,20 @@ pub fn seconds(text: &str) -> Result<f64> {
 pub fn time(text: &str) -> Result<f64> {
     let value = text.parse().ok().filter(|seconds: &f64| seconds.is_finite());
     value.ok_or_else(|| Error::bad_value("time", format!("'{text}' is not a number of seconds")))
+}
+
+/// Position, forward and up of a camera: nine finite numbers with commas between; the directions are made unit.
+pub fn pose(text: &str) -> Result<[Vec3; 3]> {
+    let bad = || Error::bad_value("pose", format!("'{text}' is not nine numbers with commas: position, forward, up"));
+    let number = |part: &str| part.trim().parse().ok().filter(|value: &f32| value.is_finite());
+    let numbers: Option<Vec<f32>> = text.split(',').map(number).collect();
+    let [position, forward, up]: [Vec3; 3] = match numbers.as_deref() {
+        Some(all @ [_, _, _, _, _, _, _, _, _]) => std::array::from_fn(|i| Vec3::from_slice(&all[3 * i..])),
+        _ => return Err(bad()),
+    };
+    // Without a direction of its own, or with up along the view, there is no picture.
+    let (forward, up) = forward.try_normalize().zip(up.try_normalize()).ok_or_else(bad)?;
+    up.reject_from_normalized(forward).try_normalize().map(|_| [position, forward, up]).ok_or_else(bad)
 }
 
 /// Pictures a second: a finite number above 0.

@@ -2,10 +2,12 @@
 
 use crate::failure::{Failure, Result};
 use crate::{options, report, scene};
-use glam::UVec2;
+use glam::{UVec2, Vec3};
 use pollster::block_on;
+use restir::scene::Camera;
 use restir::scene::flat::SceneStats;
-use restir::{Gpu, GpuOptions, Renderer, lab, techniques};
+use restir::techniques::{self, TechniqueInfo, presets};
+use restir::{Gpu, GpuOptions, Renderer, lab};
 use std::time::Instant;
 
 /// The parameter that turns the environment, which is then something that moves.
@@ -17,6 +19,9 @@ pub struct Options {
     /// Technique id (see `restir techniques`).
     #[arg(long, value_name = "ID", default_value = "restir-di")]
     pub technique: String,
+    /// A technique with settings that go by a name (see `restir techniques`); --set comes after it.
+    #[arg(long, value_name = "ID", conflicts_with = "technique")]
+    pub preset: Option<String>,
     /// Set a parameter of the technique, or of a group, as film.exposure; may be given many times.
     #[arg(long, value_name = "KEY=VALUE", value_parser = options::assignment)]
     pub set: Vec<(String, String)>,
@@ -29,6 +34,9 @@ pub struct Options {
     /// Camera of the scene, by index or name; the first where none is given.
     #[arg(long, value_name = "INDEX|NAME")]
     pub camera: Option<String>,
+    /// Where the camera is and where it looks: position, forward and up, nine numbers with commas between, as in the page's address.
+    #[arg(long, value_name = "NUMBERS", value_parser = options::pose, conflicts_with = "camera", allow_hyphen_values = true)]
+    pub pose: Option<[Vec3; 3]>,
     /// Moment of the scene in seconds: where it stands still, or begins to move.
     #[arg(long, value_name = "T", default_value_t = 0.0, value_parser = options::time, allow_negative_numbers = true)]
     pub time: f64,
@@ -44,9 +52,21 @@ pub struct Options {
     pub lighting: scene::Lighting,
 }
 
+impl Options {
+    /// The technique and its settings: those of the preset, then those of --set.
+    fn chosen(&self) -> restir::Result<(&'static TechniqueInfo, Vec<(&str, &str)>)> {
+        let set = self.set.iter().map(|(key, value)| (key.as_str(), value.as_str()));
+        let Some(preset) = &self.preset else { return Ok((techniques::find(&self.technique)?, set.collect())) };
+        let preset = presets::find(preset)?;
+        Ok((preset.technique()?, preset.settings.iter().copied().chain(set).collect()))
+    }
+}
+
 /// A scene on the GPU, ready to render.
 pub struct Session {
     pub renderer: Renderer,
+    /// Id of the technique.
+    pub technique: &'static str,
     pub adapter: String,
     pub scene: String,
     pub camera: String,
@@ -78,11 +98,10 @@ impl Session {
     /// Loads the scene and prepares the device. Warnings go to stderr.
     pub fn open(name: &str, options: &Options) -> Result<Session> {
         // A wrong name or value is told before long work.
-        let technique = techniques::find(&options.technique).map_err(Failure::from_option)?;
-        for (key, value) in &options.set {
+        let (technique, settings) = options.chosen().map_err(Failure::from_option)?;
+        for (key, value) in &settings {
             technique.spec(key).map_or(Ok(0), |spec| spec.parse(value)).map_err(Failure::from_option)?;
         }
-        let settings: Vec<_> = options.set.iter().map(|(key, value)| (key.as_str(), value.as_str())).collect();
         (technique.check)(&settings).map_err(Failure::from_option)?;
         let flat = scene::open(name, &options.choice, Some((&options.lighting, options.seed)))?;
         report::warnings(&flat.warnings);
@@ -90,17 +109,17 @@ impl Session {
         let camera_name = flat.cameras.get(camera).map(|camera| camera.name.clone()).unwrap_or_default();
         let (scene, stats, warnings) = (flat.name.clone(), flat.stats.clone(), flat.warnings.clone());
         let turns =
-            options.set.iter().any(|(key, value)| key == TURN && value.parse::<f32>().is_ok_and(|rate| rate != 0.0));
+            settings.iter().any(|(key, value)| *key == TURN && value.parse::<f32>().is_ok_and(|rate| rate != 0.0));
         let moving = turns || !flat.rig.is_still();
 
         let gpu = block_on(Gpu::headless(&GpuOptions { default_limits: false }))?;
         let adapter = gpu.adapter_name();
         let mut renderer = Renderer::new(gpu, flat, options.size)?;
-        renderer.set_technique(&options.technique).map_err(Failure::from_option)?;
+        renderer.set_technique(technique.id).map_err(Failure::from_option)?;
         if let Some(depth) = options.max_depth {
             renderer.set("render.max_depth", &depth.to_string()).map_err(Failure::from_option)?;
         }
-        for (key, value) in &options.set {
+        for (key, value) in settings {
             renderer.set(key, value).map_err(Failure::from_option)?;
         }
         if let Some(animation) = &options.animation {
@@ -109,8 +128,13 @@ impl Session {
         renderer.set_time(options.time);
         renderer.set_seed(options.seed);
         renderer.follow_camera(camera)?;
+        if let Some([position, forward, up]) = options.pose {
+            let posed = Camera { position, forward, up, ..renderer.camera().clone() };
+            renderer.set_camera(&posed);
+        }
         Ok(Session {
             renderer,
+            technique: technique.id,
             adapter,
             scene,
             camera: camera_name,

@@ -3,12 +3,13 @@
 use crate::failure::Result;
 use crate::report;
 use restir::params::{FilmParams, ParamKind, ParamSpec, Params, RenderParams};
+use restir::techniques::presets::{self, Preset};
 use restir::techniques::{self, TechniqueInfo};
 
 /// List the techniques with their papers, bias, parameters and views.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Print JSON: techniques, the parameters of all of them (render, film), the built-in scenes, the version.
+    /// Print JSON: techniques, the parameters of all of them (render, film), presets, the built-in scenes, the version.
     #[arg(long)]
     json: bool,
 }
@@ -23,6 +24,8 @@ pub fn run(args: &Args) -> Result<()> {
         let title = std::iter::once(format!("{group}: parameters of every technique"));
         sections.push(title.chain(parameters).collect::<Vec<_>>().join("\n"));
     }
+    let presets = presets::ALL.iter().map(preset);
+    sections.push(std::iter::once("presets: --preset ID".to_owned()).chain(presets).collect::<Vec<_>>().join("\n"));
     report::text(&sections.join("\n\n"))
 }
 
@@ -32,6 +35,11 @@ fn describe(info: &TechniqueInfo) -> String {
     lines.push(format!("  bias: {}", info.bias));
     lines.extend(info.params.iter().map(|spec| parameter("", spec)));
     lines.join("\n")
+}
+
+fn preset(Preset { id, title, doc, technique, settings }: &Preset) -> String {
+    let settings: String = settings.iter().map(|(key, value)| format!(" --set {key}={value}")).collect();
+    format!("  {id}: {title}\n      {doc}\n      --technique {technique}{settings}")
 }
 
 fn parameter(prefix: &str, spec: &ParamSpec) -> String {

@@ -85,7 +85,6 @@ pub fn from_file(name: &str, file: &[u8]) -> Result<FlatScene> {
 ///
 /// # Errors
 /// [`Error::Io`] where it cannot be read, [`Error::Limit`] beyond [`MAX_FILE_BYTES`], else as [`from_file`].
-#[cfg(not(target_arch = "wasm32"))]
 pub fn load_file(path: &std::path::Path) -> Result<FlatScene> {
     from_file(&path.display().to_string(), &crate::scene::files::read(path, MAX_FILE_BYTES)?)
 }

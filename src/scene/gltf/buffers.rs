@@ -5,6 +5,7 @@ use super::decoders::MESHOPT;
 use super::{MAX_BUFFER_BYTES, Resolve, uri};
 use crate::error::Result;
 use gltf::json::buffer::View;
+use restir_decoders::meshopt;
 use serde_json::Value;
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -103,8 +104,10 @@ impl<'a> Buffers<'a> {
         let mode = extension.get("mode").and_then(Value::as_str).unwrap_or_default();
         let filter = extension.get("filter").map_or("NONE", |filter| filter.as_str().unwrap_or_default());
         // Both fit: their product is within the limit of all buffers.
-        let (count, stride) = (count as u32, stride as u32);
-        document.decode(place, |decoders| decoders.meshopt(compressed, mode, filter, count, stride))
+        document.decode(place, || {
+            let layout = meshopt::Layout::new(mode, filter, count as usize, stride as usize)?;
+            meshopt::decode(compressed, &layout)
+        })
     }
 
     /// The bytes of buffer `index`.

@@ -1,6 +1,6 @@
 //! From bytes to typed JSON: the GLB container, the JSON itself, the version and the required extensions.
 
-use super::decoders::{DECODED_EXTENSIONS, Decoders};
+use super::decoders::DECODED_EXTENSIONS;
 use super::{Contents, Options, SUPPORTED_EXTENSIONS, tidy};
 use crate::error::{Error, Result};
 use gltf::json::{Root, validation::Checked};
@@ -25,8 +25,6 @@ pub(super) struct Document<'a> {
     pub scene: Option<usize>,
     /// Index of the chosen variant, if one was chosen.
     pub variant: Option<usize>,
-    /// What decodes pictures and compressed data.
-    pub decoders: Option<&'a dyn Decoders>,
     /// Whether the file names one of [`DECODED_EXTENSIONS`].
     pub uses_decoded_extensions: bool,
     /// Channels of animations that target no node, and were taken out of `root`.
@@ -127,9 +125,9 @@ pub(super) fn parse<'a>(file: &'a str, bytes: &'a [u8], options: &Options<'a>) -
         // Lines and columns of that text are not the file's.
         serde_json::from_slice(&completed).map_err(|error| Error::bad_file(file, "JSON", json_fault(&error)))?
     };
-    let Options { scene, decoders, .. } = *options;
+    let scene = options.scene;
     let uses_decoded_extensions = header.uses_decoded_extensions();
-    Ok(Document { file, root, binary, contents, scene, variant, decoders, uses_decoded_extensions, pointers })
+    Ok(Document { file, root, binary, contents, scene, variant, uses_decoded_extensions, pointers })
 }
 
 /// Gives each scene its `nodes`, which the specification lets it leave out, but the JSON crate does not; and takes away
@@ -232,8 +230,6 @@ struct Header {
     extensions: Extensions,
     #[serde(default)]
     animations: Vec<AnimationHeader>,
-    #[serde(default)]
-    images: Vec<serde::de::IgnoredAny>,
 }
 
 /// One of `animations` of [`Header`].
@@ -309,7 +305,6 @@ impl Header {
             scenes: self.scenes.iter().enumerate().map(name).collect(),
             scene: self.scene,
             variants: self.extensions.variants.variants.iter().map(|variant| tidy(&variant.name)).collect(),
-            needs_decoders: !self.images.is_empty() || self.uses_decoded_extensions(),
         }
     }
 

@@ -2,12 +2,12 @@
 
 use super::buffers::Buffers;
 use super::container::Document;
-use super::decoders::{DRACO, DracoMesh};
+use super::decoders::DRACO;
 use super::mesh::Budget;
 use crate::error::Result;
 use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::mesh::Primitive;
-use restir_decoders::draco::Attribute as DracoAttribute;
+use restir_decoders::draco::{self, Attribute as DracoAttribute, Mesh as DracoMesh};
 use serde_json::{Map, Value};
 
 /// A decompressed primitive.
@@ -35,7 +35,7 @@ impl Draco {
         let view = extension.get("bufferView").and_then(Value::as_u64).and_then(|view| usize::try_from(view).ok());
         let view = view.ok_or_else(|| document.bad(&place, "it has no bufferView"))?;
         let (bytes, _) = buffers.view(document, view, &place)?;
-        let mesh = document.decode(&place, |decoders| decoders.draco(bytes, budget.left()))?;
+        let mesh = document.decode(&place, || draco::decode(bytes, budget.left()))?;
         let attributes: usize = mesh.attributes.iter().map(|attribute| attribute.values.len()).sum();
         budget.charge(document, attributes as u64 + mesh.indices.len() as u64 * 4)?;
         let ids = extension.get("attributes").and_then(Value::as_object);

@@ -1,10 +1,11 @@
-//! Images as RGBA8: PNG and JPEG, and by their extensions WebP and KTX2. Who decodes them: [`super::Decoders`].
+//! Images as RGBA8: PNG and JPEG, and by their extensions WebP and KTX2. The crate `restir-decoders` decodes them.
 
 use super::buffers::Buffers;
 use super::container::Document;
-use super::decoders::{BASISU, Limits as PictureLimits, WEBP};
+use super::decoders::{BASISU, WEBP};
 use super::{MAX_IMAGE_BYTES, MAX_IMAGE_SIDE, Resolve, uri};
 use crate::error::Result;
+use restir_decoders::picture;
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -74,15 +75,15 @@ impl Images {
     /// Decodes `file`, whose format is told by its first bytes. The size is checked before anything is allocated for it.
     fn decode(&mut self, document: &Document, file: &[u8], place: &str) -> Result<Image> {
         let left = (MAX_IMAGE_BYTES - self.bytes.min(MAX_IMAGE_BYTES)).min(MAX_DECODER_BYTES);
-        let limits = PictureLimits { side: MAX_IMAGE_SIDE, bytes: left };
+        let limits = picture::Limits { side: MAX_IMAGE_SIDE, bytes: left };
         let by_extension = file.starts_with(b"\xabKTX 20\xbb") || file.get(8..12) == Some(b"WEBP");
-        let picture = if by_extension {
-            document.decode(place, |decoders| decoders.picture(file, limits))?
+        let decoded = if by_extension {
+            document.decode(place, || picture::decode(file, limits))?
         } else {
-            document.decode_core(place, |decoders| decoders.picture(file, limits))?
+            document.decode_core(place, || picture::decode(file, limits))?
         };
-        self.bytes += picture.pixels.len() as u64;
-        Ok(Image { width: picture.width, height: picture.height, pixels: Arc::new(picture.pixels) })
+        self.bytes += decoded.pixels.len() as u64;
+        Ok(Image { width: decoded.width, height: decoded.height, pixels: Arc::new(decoded.pixels) })
     }
 }
 

@@ -29,10 +29,7 @@ mod topology;
 mod uri;
 mod variants;
 
-#[cfg(not(target_arch = "wasm32"))]
-pub use decoders::Linked;
-pub use decoders::{DECODED_EXTENSIONS, Decoders, DracoMesh, Fault, Limits, Picture};
-#[cfg(not(target_arch = "wasm32"))]
+pub use decoders::DECODED_EXTENSIONS;
 pub(super) use uri::relative_path;
 
 use super::Scene;
@@ -81,29 +78,16 @@ const MAX_WARNINGS: usize = 100;
 /// Reads an external resource: it is given a relative path (percent-decoded, `/`-separated, without `..`).
 pub type Resolve<'r> = &'r mut dyn FnMut(&str) -> Result<Vec<u8>>;
 
-/// What a person chooses in a file, and what decodes it.
-#[derive(Clone, Copy)]
+/// What a person chooses in a file; by default its own scene and materials.
+#[derive(Clone, Copy, Default)]
 pub struct Options<'a> {
     /// Index of the scene to load instead of the file's default.
     pub scene: Option<usize>,
     /// Name of the variant (`KHR_materials_variants`) whose materials are used; as [`Contents::variants`] has it.
     pub variant: Option<&'a str>,
-    /// Decodes images, and what [`DECODED_EXTENSIONS`] compress.
-    pub decoders: Option<&'a dyn Decoders>,
 }
 
-impl Default for Options<'_> {
-    /// The file's default scene and materials; the decoders that are linked in, if any are.
-    fn default() -> Self {
-        #[cfg(not(target_arch = "wasm32"))]
-        let decoders: Option<&dyn Decoders> = Some(&Linked);
-        #[cfg(target_arch = "wasm32")]
-        let decoders: Option<&dyn Decoders> = None;
-        Options { scene: None, variant: None, decoders }
-    }
-}
-
-/// What can be chosen in a file, and whether it has something to decode.
+/// What can be chosen in a file.
 #[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Contents {
     /// Names of the scenes, in file order.
@@ -112,8 +96,6 @@ pub struct Contents {
     pub scene: usize,
     /// Names of the material variants.
     pub variants: Vec<String>,
-    /// Whether it uses one of [`DECODED_EXTENSIONS`], or has images.
-    pub needs_decoders: bool,
 }
 
 /// Looks into a file without loading it.
@@ -128,7 +110,6 @@ pub fn contents(name: &str, bytes: &[u8]) -> Result<Contents> {
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io) where it cannot be read, else as [`contents`].
-#[cfg(not(target_arch = "wasm32"))]
 pub fn contents_of_file(path: &std::path::Path) -> Result<Contents> {
     contents(&path.display().to_string(), &crate::scene::files::read(path, MAX_BUFFER_BYTES)?)
 }
@@ -137,7 +118,6 @@ pub fn contents_of_file(path: &std::path::Path) -> Result<Contents> {
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io) where a file cannot be read, else as [`load_bytes_with`].
-#[cfg(not(target_arch = "wasm32"))]
 pub fn load_file(path: &std::path::Path, options: &Options) -> Result<Scene> {
     let bytes = crate::scene::files::read(path, MAX_BUFFER_BYTES)?;
     let mut resolve = crate::scene::files::beside(path, MAX_BUFFER_BYTES);
@@ -156,7 +136,7 @@ pub fn load_bytes(name: &str, bytes: &[u8], resolve: Resolve) -> Result<Scene> {
     load_bytes_with(name, bytes, &Options::default(), resolve)
 }
 
-/// As [`load_bytes`], with a scene, a variant and decoders of the caller's choice.
+/// As [`load_bytes`], with a scene and a variant of the caller's choice.
 ///
 /// # Errors
 /// As [`load_bytes`]; [`Error::BadValue`](crate::Error::BadValue) and [`Error::Unknown`](crate::Error::Unknown) for a

@@ -1,41 +1,19 @@
-//! The page's side of the renderer: the only file that names the browser. Every method is thin; errors become
-//! `{code, message}` objects.
+//! The page's side of the renderer. Every method is thin.
 
+use super::{JsResult, Lighting, OrJs, flatten, js_error, surround_by_name};
 use crate::film::blit::Blit;
 use crate::gpu::{Gpu, GpuOptions, instance};
 use crate::pace::Pace;
-use crate::scene::flat::cooked;
-use crate::scene::gltf::{Decoders, DracoMesh, Fault, Limits, Picture};
-use crate::scene::{Camera, Projection, builtin, environment, gltf};
-use crate::{Error, FlatScene, Renderer, Scene};
+use crate::scene::{Camera, Projection, builtin};
+use crate::{Error, FlatScene, Renderer};
 use glam::{UVec2, Vec3};
 use std::pin::Pin;
 use wasm_bindgen::prelude::*;
-
-type JsResult<T> = Result<T, JsValue>;
 
 /// Runs once when the module is loaded: a panic becomes a console error with a stack.
 #[wasm_bindgen(start)]
 pub fn start() {
     console_error_panic_hook::set_once();
-}
-
-fn js_error(error: &Error) -> JsValue {
-    let object = js_sys::Object::new();
-    // Setting a property of a fresh object cannot fail.
-    let _ = js_sys::Reflect::set(&object, &"code".into(), &error.code().into());
-    let _ = js_sys::Reflect::set(&object, &"message".into(), &error.to_string().into());
-    object.into()
-}
-
-trait OrJs<T> {
-    fn js(self) -> JsResult<T>;
-}
-
-impl<T> OrJs<T> for crate::Result<T> {
-    fn js(self) -> JsResult<T> {
-        self.map_err(|e| js_error(&e))
-    }
 }
 
 /// The registry as JSON: what [`crate::describe`] gives.
@@ -44,160 +22,14 @@ pub fn describe() -> String {
     crate::describe().to_string()
 }
 
-/// What surrounds a scene instead of its own environment: `sky...` or `white`, or a map of that name as the decoders' module
-/// gives it.
-type Surroundings = (Option<String>, Option<Vec<u8>>);
-
-fn surround(scene: &mut Scene, surroundings: Surroundings) -> crate::Result<()> {
-    match surroundings {
-        (Some(name), Some(bytes)) => {
-            let map = environment::Map::from_bytes(&bytes);
-            let map = map.ok_or_else(|| Error::bad_file(&name, "map", "the decoder gave no map"))?;
-            environment::surround_by(scene, &name, map)
-        }
-        (Some(name), None) if !scene.surround(&name)? => {
-            Err(Error::Unknown { kind: "environment", name, known: "sky, white".into() })
-        }
-        _ => Ok(()),
-    }
-}
-
-fn flatten(
-    mut scene: Scene,
-    lights: u32,
-    seed: u32,
-    surroundings: Surroundings,
-    progress: &js_sys::Function,
-) -> JsResult<Vec<u8>> {
-    surround(&mut scene, surroundings).js()?;
-    scene.ensure_light(lights, seed.into());
-    let mut report = |fraction: f32, what: &str| {
-        let _ = progress.call2(&JsValue::NULL, &fraction.into(), &what.into());
-    };
-    let flat = FlatScene::build(&scene, &mut report).js()?;
-    Ok(flat.to_bytes())
-}
-
-/// A built-in scene as `FlatScene` bytes, surrounded by `environment`: `sky...`, `white`, or the name of `map`, which
-/// is as the decoders' module gives it. For a Worker.
+/// A built-in scene as `FlatScene` bytes, surrounded by `sky...` or `white` if by anything. For a Worker.
 #[wasm_bindgen]
-pub fn flatten_builtin(
-    name: &str,
-    lights: u32,
-    seed: u32,
-    environment: Option<String>,
-    map: Option<Vec<u8>>,
-    progress: &js_sys::Function,
-) -> JsResult<Vec<u8>> {
-    flatten(builtin::make(name).js()?, lights, seed, (environment, map), progress)
-}
-
-/// What can be chosen in a glTF file, and whether it needs decoders, as JSON ([`gltf::Contents`]). For a Worker.
-#[wasm_bindgen]
-pub fn contents_of(name: &str, bytes: &[u8]) -> JsResult<String> {
-    Ok(serde_json::json!(gltf::contents(name, bytes).js()?).to_string())
-}
-
-/// The `FlatScene` bytes in a cooked file, checked in full. For a Worker.
-#[wasm_bindgen]
-pub fn uncook(name: &str, bytes: &[u8]) -> JsResult<Vec<u8>> {
-    cooked::from_file(name, bytes).js()?;
-    Ok(cooked::contents(name, bytes).js()?.to_vec())
-}
-
-#[wasm_bindgen]
-extern "C" {
-    /// How a file is read: which scene and variant of it, what decodes it, what was odd before it came here.
-    pub type FileOptions;
-    #[wasm_bindgen(method, getter)]
-    fn scene(this: &FileOptions) -> Option<u32>;
-    #[wasm_bindgen(method, getter)]
-    fn variant(this: &FileOptions) -> Option<String>;
-    #[wasm_bindgen(method, getter)]
-    fn decoders(this: &FileOptions) -> Option<DecoderModule>;
-    #[wasm_bindgen(method, getter)]
-    fn warnings(this: &FileOptions) -> Vec<String>;
-
-    /// The module that `restir-decoders` is on the page, once the Worker has fetched it.
-    pub type DecoderModule;
-    #[wasm_bindgen(method, catch)]
-    fn decode_draco(this: &DecoderModule, bytes: &[u8], max_bytes: f64) -> JsResult<Vec<u8>>;
-    #[wasm_bindgen(method, catch)]
-    fn decode_meshopt(
-        this: &DecoderModule,
-        bytes: &[u8],
-        mode: &str,
-        filter: &str,
-        count: u32,
-        stride: u32,
-    ) -> JsResult<Vec<u8>>;
-    #[wasm_bindgen(method, catch)]
-    fn decode_picture(this: &DecoderModule, bytes: &[u8], max_side: u32, max_bytes: f64) -> JsResult<Vec<u8>>;
-}
-
-/// What the module threw, as its own error.
-fn fault(thrown: &JsValue) -> Fault {
-    let property = |key: &str| js_sys::Reflect::get(thrown, &key.into()).ok().and_then(|value| value.as_string());
-    // A trap is a string, or an error without a code.
-    let message = property("message").or_else(|| thrown.as_string()).unwrap_or_else(|| "the decoder failed".into());
-    match property("code").as_deref() {
-        Some("UNSUPPORTED") => Fault::Unsupported(message),
-        _ => Fault::Broken(message),
+pub fn flatten_builtin(name: &str, lighting: &Lighting, progress: &js_sys::Function) -> JsResult<Vec<u8>> {
+    let mut scene = builtin::make(name).js()?;
+    if let Some(name) = lighting.environment() {
+        surround_by_name(&mut scene, &name).js()?;
     }
-}
-
-impl Decoders for DecoderModule {
-    fn draco(&self, bytes: &[u8], max_bytes: u64) -> Result<DracoMesh, Fault> {
-        let mesh = self.decode_draco(bytes, max_bytes as f64).map_err(|thrown| fault(&thrown))?;
-        DracoMesh::from_bytes(&mesh).ok_or_else(|| Fault::Broken("the decoder gave no mesh".into()))
-    }
-
-    fn meshopt(&self, bytes: &[u8], mode: &str, filter: &str, count: u32, stride: u32) -> Result<Vec<u8>, Fault> {
-        self.decode_meshopt(bytes, mode, filter, count, stride).map_err(|thrown| fault(&thrown))
-    }
-
-    fn picture(&self, bytes: &[u8], limits: Limits) -> Result<Picture, Fault> {
-        let picture = self.decode_picture(bytes, limits.side, limits.bytes as f64).map_err(|thrown| fault(&thrown))?;
-        Picture::from_bytes(picture).ok_or_else(|| Fault::Broken("the decoder gave no picture".into()))
-    }
-}
-
-/// A glTF file as `FlatScene` bytes; `resolve(uri)` gives the bytes of a file beside it, or undefined. For a Worker.
-#[allow(
-    clippy::too_many_arguments,
-    reason = "the Worker calls it with plain values, which cross the boundary one by one"
-)]
-#[wasm_bindgen]
-pub fn flatten_file(
-    name: &str,
-    bytes: &[u8],
-    resolve: &js_sys::Function,
-    options: &FileOptions,
-    lights: u32,
-    seed: u32,
-    environment: Option<String>,
-    map: Option<Vec<u8>>,
-    progress: &js_sys::Function,
-) -> JsResult<Vec<u8>> {
-    let mut find = |uri: &str| {
-        resolve
-            .call1(&JsValue::NULL, &uri.into())
-            .ok()
-            .filter(|v| v.is_instance_of::<js_sys::Uint8Array>())
-            .map(|v| js_sys::Uint8Array::new(&v).to_vec())
-            .ok_or_else(|| {
-                Error::bad_file(name, uri, "refers to a file that was not given; choose all its files at once")
-            })
-    };
-    let (variant, decoders) = (options.variant(), options.decoders());
-    let choice = gltf::Options {
-        scene: options.scene().map(|scene| scene as usize),
-        variant: variant.as_deref(),
-        decoders: decoders.as_ref().map(|decoders| decoders as &dyn Decoders),
-    };
-    let mut scene = gltf::load_bytes_with(name, bytes, &choice, &mut find).js()?;
-    scene.warnings.splice(0..0, options.warnings());
-    flatten(scene, lights, seed, (environment, map), progress)
+    flatten(scene, lighting, progress)
 }
 
 #[wasm_bindgen]

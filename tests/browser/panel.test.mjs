@@ -1,0 +1,136 @@
+// What the page offers beside the picture: presets, search, keys, passes, saving and copying.
+import { strict as assert } from 'node:assert';
+import { after, before, test } from 'node:test';
+import { renderNatively } from './native.mjs';
+import { assertNoProblems, openPage, openSite, readDisplay, waitForFrames } from './pages.mjs';
+
+let site;
+before(async () => (site = await openSite()));
+after(() => site.close());
+
+/** Headless browsers have no clipboard of their own: what would be copied is kept. */
+const keepCopies = () =>
+  Object.defineProperty(navigator, 'clipboard', { value: { writeText: async (text) => void (window.copied = text) } });
+
+async function withPage(query, work) {
+  const { page, problems } = await openPage(site, query, keepCopies);
+  try {
+    await waitForFrames(page, 1);
+    await work(page);
+    assertNoProblems(problems);
+  } finally {
+    await page.close();
+  }
+}
+
+const small = '?scene=cornell&size=24x16&frames=2';
+const value = (page, selector) => page.$eval(selector, (element) => element.value);
+const addressHas = (page, text) => page.waitForFunction((wanted) => location.search.includes(wanted), { polling: 50 }, text);
+
+test('a preset sets technique and parameters, and is left when one of them changes', () =>
+  withPage(small, async (page) => {
+    assert.equal(await value(page, '#preset'), '');
+    await page.select('#preset', 'wyman-2021-unbiased');
+    await addressHas(page, 'visibility=mis');
+    await waitForFrames(page, 2);
+    assert.equal(await value(page, '#technique'), 'restir-di-decoupled');
+    assert.equal(await value(page, '#parameter-visibility'), 'mis');
+    assert.equal(await value(page, '#preset'), 'wyman-2021-unbiased');
+    await page.select('#preset', 'lanz-2025');
+    await addressHas(page, 'render.energy_compensation=true');
+    await waitForFrames(page, 2);
+    assert.ok(!(await page.evaluate(() => location.search)).includes('visibility=mis'));
+    await page.select('#preset', 'bitterli-2020-unbiased');
+    await addressHas(page, 'reuse_weights=1%2Fz'.replace('%2F', '/'));
+    assert.ok(!(await page.evaluate(() => location.search)).includes('render.'), 'the former preset leaves nothing');
+    await waitForFrames(page, 2);
+    const picture = await readDisplay(page);
+    const native = await renderNatively('builtin:cornell', ['--preset', 'bitterli-2020-unbiased', '--size', '24x16', '--frames', '2']);
+    const close = picture.filter((byte, at) => Math.abs(byte - native.rgb[at]) <= 2).length;
+    assert.ok(close / picture.length > 0.99, `${close} of ${picture.length} values are those of the command line's preset`);
+    await page.select('#parameter-reuse_weights', 'balance');
+    await page.waitForFunction(() => document.getElementById('preset').value === '', { polling: 50 });
+  }));
+
+test('settings are searched by name and by what they do', () =>
+  withPage(small, async (page) => {
+    const shown = () => page.$$eval('.parameter', (rows) => rows.filter((row) => row.offsetParent !== null).map((row) => row.querySelector('label').htmlFor));
+    const all = (await shown()).length;
+    await page.type('#search', 'same block of 4');
+    assert.deepEqual(await shown(), ['parameter-temporal_permutation']);
+    // What was looked for stays when the panel is made anew.
+    await page.select('#technique', 'path-tracer');
+    await addressHas(page, 'technique=path-tracer');
+    assert.deepEqual(await shown(), []);
+    await page.select('#technique', 'restir-di');
+    await page.waitForFunction(() => document.querySelectorAll('.parameter:not([hidden])').length === 1, { polling: 50 });
+    await page.$eval('#search', (search) => {
+      search.value = '';
+      search.dispatchEvent(new Event('input'));
+    });
+    assert.equal((await shown()).length, all);
+  }));
+
+test('? lists the keys, and Escape closes the list', () =>
+  withPage(small, async (page) => {
+    await page.focus('#canvas');
+    await page.keyboard.type('?');
+    assert.ok(await page.$eval('#help', (help) => help.open && help.innerText.includes('Wheel')));
+    await page.keyboard.press('Escape');
+    assert.ok(await page.$eval('#help', (help) => !help.open));
+  }));
+
+test('passes are listed with their times, or it is said that they cannot be', () =>
+  withPage('?scene=cornell&size=24x16', async (page) => {
+    await page.click('#timing summary');
+    // The first frame has no temporal pass.
+    await waitForFrames(page, 3);
+    const passes = await page.evaluate(async () => JSON.parse(await window.restir.call((viewer) => viewer.stats())).passes.map(({ name }) => name));
+    const told = passes.length > 0 ? [...passes, 'scene/visibility'] : ['does not tell'];
+    const all = (wanted) => wanted.every((word) => document.getElementById('passes').innerText.includes(word));
+    await page.waitForFunction(all, { polling: 50 }, told);
+  }));
+
+test('the picture is saved, a link copied that shows it, and a command line that renders it', () =>
+  withPage(`${small}&technique=normals&render.pixel_filter=center&seed=5`, async (page) => {
+    await page.evaluate(() => {
+      HTMLAnchorElement.prototype.click = function () {
+        window.saved = fetch(this.href).then(async (file) => ({ name: this.download, bytes: [...new Uint8Array(await file.arrayBuffer())] }));
+      };
+    });
+    await waitForFrames(page, 2);
+    const picture = await readDisplay(page);
+    await page.click('#save');
+    const saved = await page.waitForFunction(() => window.saved, { polling: 50 }).then((handle) => handle.jsonValue());
+    assert.equal(saved.name, 'cornell-normals.png');
+    assert.deepEqual(saved.bytes.slice(0, 4), [0x89, 0x50, 0x4e, 0x47]);
+
+    await page.click('#copy-link');
+    const link = await page.waitForFunction(() => window.copied, { polling: 50 }).then((handle) => handle.jsonValue());
+    const other = await openPage(site, new URL(link).search);
+    await waitForFrames(other.page, 2);
+    assert.deepEqual(await readDisplay(other.page), picture);
+    await other.page.close();
+
+    await page.evaluate(() => (window.copied = undefined));
+    await page.click('#copy-command');
+    const command = await page.waitForFunction(() => window.copied, { polling: 50 }).then((handle) => handle.jsonValue());
+    assert.equal(command, 'restir render builtin:cornell --technique normals --set render.pixel_filter=center --size 24x16 --frames 2 --seed 5 --out picture.png');
+
+    // A camera that was moved is in it as well. Without noise, for frames go on being counted when it moves.
+    await page.evaluate(() => (window.copied = undefined));
+    await page.mouse.move(100, 200);
+    await page.mouse.down();
+    await page.mouse.move(140, 210, { steps: 2 });
+    await page.mouse.up();
+    await addressHas(page, 'pose=');
+    await waitForFrames(page, 2);
+    const moved = await readDisplay(page);
+    assert.notDeepEqual(moved, picture);
+    await page.click('#copy-command');
+    const posed = await page.waitForFunction(() => window.copied, { polling: 50 }).then((handle) => handle.jsonValue());
+    const [pose] = /(?<=--pose )\S+/.exec(posed) ?? [];
+    const native = await renderNatively('builtin:cornell', ['--technique', 'normals', '--set', 'render.pixel_filter=center', '--size', '24x16', '--frames', '2', '--seed', '5', '--pose', pose]);
+    const close = moved.filter((byte, at) => Math.abs(byte - native.rgb[at]) <= 2).length;
+    assert.ok(close / moved.length > 0.97, `${close} of ${moved.length} values are those of ${posed}`);
+  }));

@@ -1,0 +1,63 @@
+// A scene file by its address, and the files that it names, which lie beside it.
+
+/** The bytes at `address`; throws IO, with `name` and the reason. */
+export async function fetchBytes(name: string, address: string): Promise<Uint8Array> {
+  let problem: string;
+  try {
+    const response = await fetch(address);
+    if (response.ok) return new Uint8Array(await response.arrayBuffer());
+    problem = `the server says ${response.status} ${response.statusText}`;
+  } catch (error) {
+    // A server that does not let this page read its files looks like one that is not there.
+    problem = `${(error as Error).message} (the server has to be there, and to allow this page to read its files)`;
+  }
+  throw { code: 'IO', message: `${name}: ${problem}` };
+}
+
+/** `%20` and the like as what they stand for. */
+export function decoded(uri: string): string {
+  try {
+    return decodeURIComponent(uri);
+  } catch {
+    return uri;
+  }
+}
+
+/** URIs of the buffers and images that are not in the file itself. What is broken is the reader's to say. */
+function namedByGltf(json: string): string[] {
+  try {
+    const { buffers = [], images = [] } = JSON.parse(json) as Record<string, { uri?: string }[]>;
+    return [...buffers, ...images].flatMap(({ uri }) => (uri === undefined || uri.startsWith('data:') ? [] : [uri]));
+  } catch {
+    return [];
+  }
+}
+
+/** What follows the keyword on each line where `keyword` matches. */
+const wordsAfter = (keyword: string, text: string) => [...text.matchAll(new RegExp(`^\\s*(?:${keyword})\\s+(.*\\S)`, 'gim'))].map((match) => match[1] ?? '');
+
+/** The files that `name` refers to, as it writes them. */
+function namedBy(name: string, bytes: Uint8Array): string[] {
+  const text = (from = 0, to?: number) => new TextDecoder().decode(bytes.subarray(from, to));
+  if (/\.gltf$/i.test(name)) return namedByGltf(text());
+  // A header of 12 bytes, the length of the JSON, its kind, the JSON.
+  if (/\.glb$/i.test(name) && bytes.length > 20) return namedByGltf(text(20, 20 + new DataView(bytes.buffer, bytes.byteOffset).getUint32(12, true)));
+  if (/\.obj$/i.test(name)) return wordsAfter('mtllib', text());
+  // Options stand before the name of a map.
+  if (/\.mtl$/i.test(name)) return wordsAfter('map_\\w+|bump|norm|disp|decal|refl', text()).map((words) => words.split(/\s+/).at(-1) ?? '');
+  return [];
+}
+
+/** The file at `address` under `name`, and all that it names under the names that it uses. Throws IO. */
+export async function fetchScene(name: string, address: string): Promise<Map<string, Uint8Array>> {
+  const files = new Map<string, Uint8Array>();
+  const take = async (uri: string, url: string): Promise<void> => {
+    if (files.has(decoded(uri))) return;
+    files.set(decoded(uri), new Uint8Array());
+    const bytes = await fetchBytes(uri, url);
+    files.set(decoded(uri), bytes);
+    await Promise.all(namedBy(uri, bytes).map((other) => take(other, new URL(other, address).href)));
+  };
+  await take(name, address);
+  return files;
+}

@@ -1,0 +1,4 @@
+// A page whose only moving parts are its viewers.
+import { startViewers } from './viewers.js';
+
+void startViewers();

@@ -1,0 +1,729 @@
+// A scene on a canvas: loads it, renders it, moves its camera, and starts again when the device is lost. Knows no page.
+import { findAdapter } from './adapter.js';
+import type { Camera, Description, Failure, Pose, SceneReport, Stats } from './api.js';
+import { OrbitCamera } from './camera.js';
+import { Controls } from './controls.js';
+import { description, isDefault, parameterOf, techniqueOf } from './description.js';
+import { readDropped, sourceOf, surroundingsOf } from './files.js';
+import { SceneLoader } from './loader.js';
+import { RestirError, toFailure } from './messages.js';
+import { Viewer } from './pkg/restir.js';
+import type { Choice, Contents, SceneSource, Surroundings } from './protocol.js';
+import { RenderLoop } from './render-loop.js';
+import { Resolution } from './resolution.js';
+import { type Settings, defaultSettings, writeQuery } from './url-state.js';
+import { compileWasm, startWasm } from './wasm.js';
+
+export type { Camera, Choice, Contents, Description, Failure, Pose, SceneReport, Settings, Stats };
+export { RestirError };
+
+/** One frame. */
+export interface Sample {
+  /** Frames in the picture: 1 where they are not averaged. */
+  count: number;
+  /** From the frame's first command to an idle device. */
+  milliseconds: number;
+  /** Rendered pixels. */
+  width: number;
+  height: number;
+  /** Moment of the scene, in seconds. */
+  time: number;
+  /** Whether the picture has all the frames it shall have. */
+  complete: boolean;
+}
+
+/** What went wrong. The last good picture stays on the canvas. */
+export interface ViewerFailure extends Failure {
+  /** `name=value` of a setting given to the constructor that was not taken; its default is used instead. */
+  setting?: string;
+  /** The renderer has stopped: after `INTERNAL` only loading the page again helps, else `restore()` may. */
+  stopped?: boolean;
+}
+
+/** What is shown. */
+export interface Scene {
+  source: SceneSource;
+  surroundings: Surroundings | undefined;
+  report: SceneReport;
+  cameras: Camera[];
+  /** Scenes and variants to choose from in a glTF file. */
+  contents: Contents;
+}
+
+/** A value that has changed: of a parameter by its key, or of one of `Settings` by its name. */
+export interface Change {
+  name: string;
+  value: string | number | boolean | undefined;
+}
+
+export interface ViewerEventMap {
+  /** How far a load is, from 0 to 1, and what it does; at 1 the renderer takes it over, and it cannot be cancelled any more. */
+  progress: CustomEvent<{ fraction: number; what: string }>;
+  /** A scene is shown. */
+  load: CustomEvent<Scene>;
+  /** After each frame. */
+  sample: CustomEvent<Sample>;
+  /** The camera was moved, by hand or by `setCamera`. */
+  'camera-change': CustomEvent<Camera>;
+  'param-change': CustomEvent<Change>;
+  error: CustomEvent<ViewerFailure>;
+  /** The graphics device was lost. Unless `final`, the viewer is about to build everything again. */
+  devicelost: CustomEvent<{ message: string; final: boolean }>;
+  /** The viewer renders again, on another device. */
+  restored: CustomEvent<null>;
+}
+
+export interface RestirViewer {
+  addEventListener<Type extends keyof ViewerEventMap>(
+    type: Type,
+    listener: (event: ViewerEventMap[Type]) => void,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
+  addEventListener(type: string, listener: EventListenerOrEventListenerObject | null, options?: boolean | AddEventListenerOptions): void;
+}
+
+/** What a scene opens with. What is left out is the scene's own; `environment` is kept as it is. */
+export interface LoadOptions {
+  /** `sky...`, `white`, or the address of an .hdr or .exr map; null for the scene's own. */
+  environment?: string | null | undefined;
+  /** Index or name among the scene's cameras. */
+  camera?: string;
+  pose?: Pose;
+  /** Seconds. */
+  time?: number;
+}
+
+const noContents: Contents = { scenes: [], scene: 0, variants: [] };
+/** So many losses within so many milliseconds, and the viewer gives up. */
+const [mostLosses, lossesWithin] = [2, 30_000];
+
+const disposed = () => new RestirError({ code: 'DISPOSED', message: 'The viewer has been disposed.' });
+const invalid = (message: string) => new RestirError({ code: 'BAD_VALUE', message });
+
+function checkRange(name: string, value: number, low: number, high: number, whole = false): void {
+  if (value >= low && value <= high && (!whole || Number.isInteger(value))) return;
+  throw invalid(`${name} must be a ${whole ? 'whole ' : ''}number from ${low} to ${high}.`);
+}
+
+/**
+ * Renders a scene to a canvas, as large as the canvas is shown. Nothing is fetched before the first `load`.
+ *
+ * Methods that change the picture take effect between two frames, and wait for the first scene where there is none yet. Each
+ * failure is one `error` event, and rejects the method's promise with a `RestirError`; that need not be caught.
+ */
+export class RestirViewer extends EventTarget {
+  /** What determines the picture: to be read, and changed by the methods. */
+  readonly settings: Settings;
+  private readonly loader = new SceneLoader();
+  private readonly orbit = new OrbitCamera();
+  private readonly resolution: Resolution;
+  private readonly loop = new RenderLoop({
+    beforeFrame: (viewer, seconds) => this.beforeFrame(viewer, seconds),
+    afterFrame: (viewer, milliseconds) => this.afterFrame(viewer, milliseconds),
+    failed: (error) => this.failed(error),
+  });
+  private input: { controls: Controls; end: AbortController } | undefined;
+  private viewer: Viewer | undefined;
+  private shown: Scene | undefined;
+  /** The scene as the worker made it: a lost device is rebuilt from it. */
+  private flat: Uint8Array | undefined;
+  private started: Promise<void> | undefined;
+  /** Scenes are shown, and renderers made, one after another. */
+  private turn: Promise<unknown> = Promise.resolve();
+  private rendered: [number, number] = [0, 0];
+  /** Of the last frame. */
+  private moment = 0;
+  /** When devices were lost. */
+  private losses: number[] = [];
+  private ended = false;
+
+  /** `settings` are those of the first scene; what it does not take is reported and dropped. `scene` is ignored: see `load`. */
+  constructor(private readonly canvas: HTMLCanvasElement, settings: Partial<Settings> = {}) {
+    super();
+    this.settings = { ...defaultSettings(), ...settings, values: new Map(settings.values) };
+    this.resolution = new Resolution(canvas);
+    this.resolution.fixedSize = this.settings.size;
+    this.resolution.fixedScale = this.settings.scale;
+    this.loop.frameLimit = this.settings.frames ?? Infinity;
+  }
+
+  /** All techniques, parameters and built-in scenes. */
+  static async describe(): Promise<Description> {
+    await startWasm();
+    return description();
+  }
+
+  // Scenes
+
+  /**
+   * Shows a scene: `builtin:cornell`, `cornell`, or the address of a .glb, .gltf, .obj or .restir file. A load still running is
+   * abandoned: it rejects with `CANCELLED`. Rejects with `IO`, `BAD_FILE`, `UNSUPPORTED`, `UNKNOWN_NAME`, `LIMIT`, `NO_WEBGPU`, ...
+   */
+  load(scene: string, { environment, ...view }: LoadOptions = {}): Promise<void> {
+    const given = Object.fromEntries(Object.entries(view).filter(([, value]) => value !== undefined));
+    return this.reported(async () => this.open(sourceOf(scene), this.surroundingsFor(environment), given));
+  }
+
+  /** Shows files that were picked or dropped: a scene, an environment map, or both. Rejects also with `NOT_A_SCENE`. */
+  loadFiles(files: readonly File[]): Promise<void> {
+    return this.reported(async () => {
+      const { source, surroundings = this.shown?.surroundings } = await readDropped(files);
+      await this.open(source ?? this.source(), surroundings, source ? {} : undefined);
+    });
+  }
+
+  /** Surrounds the scene by `sky...`, `white` or the map at an address; null gives it back its own environment. */
+  setEnvironment(environment: string | null): Promise<void> {
+    return this.reported(async () => this.open(this.source(), this.surroundingsFor(environment), undefined));
+  }
+
+  /** Shows another scene or variant of the file that is shown; does nothing for a built-in scene. */
+  choose(choice: Choice): Promise<void> {
+    return this.reported(async () => {
+      const source = this.source();
+      if (source.kind === 'builtin') return;
+      const view = choice.scene === undefined ? undefined : {};
+      await this.open({ ...source, choice: { ...source.choice, ...choice } }, this.shown?.surroundings, view);
+    });
+  }
+
+  /** Abandons the load that is running, if one is. */
+  cancel(): void {
+    this.loader.cancel();
+  }
+
+  /** Whether a load is running. */
+  get loading(): boolean {
+    return this.loader.busy;
+  }
+
+  /** What is shown; undefined before the first `load` event. */
+  get scene(): Scene | undefined {
+    return this.shown;
+  }
+
+  // Settings
+
+  /** Switches to another technique, with its own defaults; the renderer's and film's parameters stay. Rejects with `UNKNOWN_NAME`. */
+  setTechnique(id: string): Promise<void> {
+    return this.set('technique', id, (viewer) => this.takeTechnique(viewer, id));
+  }
+
+  /** Switches to a preset: its technique, and the renderer's parameters as it says; the film's stay. Rejects with `UNKNOWN_NAME`. */
+  setPreset(id: string): Promise<void> {
+    return this.set('preset', id, (viewer) => {
+      const preset = description().presets.find((known) => known.id === id);
+      if (!preset) throw { code: 'UNKNOWN_NAME', message: `there is no preset ${id}` };
+      const { values } = this.settings;
+      for (const key of [...values.keys()].filter((name) => name.startsWith('render.'))) {
+        viewer.set(key, String(parameterOf(preset.technique, key)?.default));
+        values.delete(key);
+      }
+      this.takeTechnique(viewer, preset.technique);
+      for (const [key, value] of Object.entries(preset.settings)) {
+        viewer.set(key, value);
+        values.set(key, value);
+      }
+    });
+  }
+
+  /** The preset whose settings these are; undefined where something else is set, but for how the film is shown. */
+  get preset(): string | undefined {
+    const { technique, values } = this.settings;
+    const own = [...values].filter(([key]) => !key.startsWith('film.'));
+    const same = (settings: Record<string, string>) => own.length === Object.keys(settings).length && own.every(([key, value]) => settings[key] === value);
+    return description().presets.find((preset) => preset.technique === technique && same(preset.settings))?.id;
+  }
+
+  /**
+   * Sets the parameter `name`, `render.name` or `film.name`; undefined sets its default. Rejects with `UNKNOWN_NAME` or `BAD_VALUE`.
+   */
+  setParam(name: string, value: string | number | boolean | undefined): Promise<void> {
+    const work = (viewer: Viewer) => {
+      const parameter = parameterOf(this.settings.technique, name);
+      const text = String(value ?? parameter?.default);
+      viewer.set(name, text);
+      if (parameter && isDefault(parameter, text)) this.settings.values.delete(name);
+      else this.settings.values.set(name, text);
+    };
+    return this.set(name, value, work, name.startsWith('film.'));
+  }
+
+  /** Shows a debug view of the technique, or `radiance`. Rejects with `UNKNOWN_NAME`. */
+  setView(name: string): Promise<void> {
+    return this.set('view', name, (viewer) => {
+      viewer.set_view(name);
+      this.settings.view = name;
+    });
+  }
+
+  /** Sets the seed of all random numbers, 0 to 4294967295. */
+  setSeed(seed: number): Promise<void> {
+    return this.set('seed', seed, (viewer) => {
+      checkRange('seed', seed, 0, 0xffffffff, true);
+      viewer.set_seed(seed);
+      this.settings.seed = seed;
+    });
+  }
+
+  /** Goes to one of the scene's cameras, by index or name, or to where a pose says. Rejects with `UNKNOWN_NAME` or `BAD_VALUE`. */
+  setCamera(camera: string | number | Pose): Promise<void> {
+    return this.reported(() =>
+      this.loop.change((viewer) => {
+        if (typeof camera === 'object') this.takePose(viewer, camera);
+        else this.followCamera(viewer, String(camera));
+        this.emit('camera-change', this.camera());
+      }),
+    );
+  }
+
+  /** The camera of the picture. */
+  camera(): Camera {
+    return this.orbit.toCamera();
+  }
+
+  /** Index of the scene's camera that was chosen last. */
+  get cameraIndex(): number {
+    return this.indexOfCamera(this.settings.camera) ?? 0;
+  }
+
+  /** Goes to a moment of the scene, in seconds. */
+  setTime(seconds: number): Promise<void> {
+    return this.set('time', seconds, (viewer) => {
+      checkRange('time', seconds, -1e9, 1e9);
+      viewer.set_time(seconds);
+      this.settings.time = seconds;
+    });
+  }
+
+  /** How many times as fast the scene's time runs. */
+  setSpeed(speed: number): Promise<void> {
+    return this.set('speed', speed, (viewer) => {
+      checkRange('speed', speed, -1e6, 1e6);
+      viewer.set_speed(speed);
+      this.settings.speed = speed;
+    });
+  }
+
+  /** Plays another of the scene's animations, by index or name. Rejects with `UNKNOWN_NAME`. */
+  setAnimation(animation: string): Promise<void> {
+    return this.set('animation', animation, (viewer) => {
+      viewer.set_animation(animation);
+      this.settings.animation = animation;
+    });
+  }
+
+  /** Whether frames are averaged while time stands still, or time runs; undefined leaves it to the scene: one that moves runs. */
+  setAccumulate(on: boolean | undefined): Promise<void> {
+    return this.set('accumulate', on, (viewer) => {
+      this.settings.accumulate = on;
+      viewer.set_accumulate(this.accumulating);
+      // A link shows the moment at which time was stopped.
+      this.settings.time = viewer.time();
+      if (this.accumulating) viewer.set_time(viewer.time());
+    });
+  }
+
+  /** Whether frames are averaged. */
+  get accumulating(): boolean {
+    const turns = Number(this.settings.values.get('render.environment_rotation_rate') ?? 0) !== 0;
+    return this.settings.accumulate ?? !(this.shown?.report.animated || turns);
+  }
+
+  /** Rendered pixels per device pixel along one side, 0.1 to 2; undefined adapts to the time that frames take. */
+  setScale(scale: number | undefined): Promise<void> {
+    return this.reported(async () => {
+      if (scale !== undefined) checkRange('scale', scale, 0.1, 2);
+      this.settings.scale = this.resolution.fixedScale = scale;
+      this.emit('param-change', { name: 'scale', value: scale });
+    });
+  }
+
+  /** Stops after so many averaged frames, until something changes; undefined goes on. */
+  setMaxSamples(frames: number | undefined): Promise<void> {
+    return this.reported(async () => {
+      if (frames !== undefined) checkRange('max-samples', frames, 1, 0xffffffff, true);
+      this.settings.frames = frames;
+      this.loop.frameLimit = frames ?? Infinity;
+      this.emit('param-change', { name: 'frames', value: frames });
+    });
+  }
+
+  /** What mouse, keys and touch on the canvas do; nothing by default. */
+  get controls(): 'none' | 'orbit' | 'fly' {
+    return this.input?.controls.mode ?? 'none';
+  }
+
+  set controls(mode: 'none' | 'orbit' | 'fly') {
+    if (mode === 'none') {
+      this.input?.end.abort();
+      this.input = undefined;
+      return;
+    }
+    if (!this.input) {
+      const end = new AbortController();
+      this.input = { controls: new Controls(this.canvas, this.orbit, end.signal), end };
+    }
+    this.input.controls.mode = mode;
+  }
+
+  // Rendering
+
+  /** Stops rendering; the picture stays. */
+  pause(): void {
+    this.loop.paused = true;
+  }
+
+  /** Goes on rendering. */
+  play(): void {
+    this.loop.paused = false;
+  }
+
+  get paused(): boolean {
+    return this.loop.paused;
+  }
+
+  /** Pauses, and renders one more frame. */
+  step(): void {
+    this.pause();
+    this.loop.step();
+  }
+
+  /** While true nothing is rendered, because nobody sees it. A hidden tab does that by itself. */
+  get suspended(): boolean {
+    return this.loop.suspended;
+  }
+
+  set suspended(on: boolean) {
+    this.loop.suspended = on;
+  }
+
+  /** Starts the picture again. */
+  reset(): Promise<void> {
+    return this.reported(() => this.loop.change((viewer) => viewer.reset()));
+  }
+
+  // What is there
+
+  /** The picture as shown: a PNG file, or `ImageData` of sRGB bytes, row-major from the top. */
+  capture(options: { type: 'rgba' }): Promise<ImageData>;
+  capture(options?: { type: 'png' }): Promise<Blob>;
+  capture({ type = 'png' }: { type?: 'png' | 'rgba' } = {}): Promise<ImageData | Blob> {
+    return this.reported(async () => {
+      if (type !== 'png' && type !== 'rgba') throw invalid(`${String(type)} is neither png nor rgba.`);
+      const picture = await this.picture();
+      if (type === 'rgba') return picture;
+      const canvas = new OffscreenCanvas(picture.width, picture.height);
+      canvas.getContext('2d')?.putImageData(picture, 0, 0);
+      return canvas.convertToBlob({ type: 'image/png' });
+    });
+  }
+
+  /** Red, green, blue and alpha, 0 to 255, of the rendered pixel at (x, y) from the top left. Rejects with `BAD_VALUE` outside. */
+  readPixel(x: number, y: number): Promise<[number, number, number, number]> {
+    return this.reported(async () => {
+      const { data, width, height } = await this.picture();
+      checkRange('x', x, 0, width - 1, true);
+      checkRange('y', y, 0, height - 1, true);
+      const at = 4 * (y * width + x);
+      return [...data.subarray(at, at + 4)] as [number, number, number, number];
+    });
+  }
+
+  /**
+   * The address at which `page`, by default the one that restir comes with, shows the same picture. The files of the user's are
+   * not in it.
+   */
+  shareUrl(page: string | URL = import.meta.url.replace(/[^/]*$/, '')): string {
+    const url = new URL(page, document.baseURI);
+    url.search = writeQuery(this.settings);
+    return url.href;
+  }
+
+  /** Rays and milliseconds of each pass in the last frame. Passes are empty where the device has no timestamps. */
+  timings(): Promise<Stats> {
+    return this.call(async (viewer) => JSON.parse((await viewer.stats()) as string) as Stats);
+  }
+
+  /** Runs work on the wasm module's own viewer between two frames; for what has no method here. */
+  call<T>(work: (viewer: Viewer) => T | Promise<T>): Promise<T> {
+    return this.loop.call(work);
+  }
+
+  // Beginning and end
+
+  /** Makes the renderer anew from the scene that is shown. The viewer does so by itself unless devices are lost again and again. */
+  restore(): Promise<void> {
+    return this.reported(() => this.rebuild());
+  }
+
+  /** Ends everything and frees the memory. What waits, and what is called later, rejects with `DISPOSED`. */
+  dispose(): void {
+    if (this.ended) return;
+    this.ended = true;
+    this.controls = 'none';
+    this.loader.cancel();
+    void this.loop.end(disposed()).then(() => this.inTurn(async () => this.freeViewer()));
+  }
+
+  private emit<Type extends keyof ViewerEventMap>(type: Type, detail: ViewerEventMap[Type]['detail']): void {
+    if (!this.ended) this.dispatchEvent(new CustomEvent(type, { detail }));
+  }
+
+  /** Runs `work`; a failure becomes an event, and an error that need not be caught. */
+  private reported<T>(work: () => Promise<T>): Promise<T> {
+    const done = work().catch((thrown: unknown) => {
+      const error = new RestirError(toFailure(thrown));
+      if (error.code !== 'CANCELLED') this.emit('error', { code: error.code, message: error.message });
+      throw error;
+    });
+    done.catch(() => undefined);
+    return done;
+  }
+
+  private inTurn<T>(work: () => Promise<T>): Promise<T> {
+    const done = this.turn.then(work);
+    this.turn = done.catch(() => undefined);
+    return done;
+  }
+
+  /** Changes the picture between two frames. What only shows the film otherwise needs no new frame. */
+  private set(name: string, value: Change['value'], work: (viewer: Viewer) => void, onlyFilm = false): Promise<void> {
+    const apply = (viewer: Viewer) => {
+      work(viewer);
+      if (onlyFilm) viewer.present();
+      this.emit('param-change', { name, value });
+    };
+    return this.reported(() => (onlyFilm ? this.loop.call(apply) : this.loop.change(apply)));
+  }
+
+  private takeTechnique(viewer: Viewer, id: string): void {
+    const { settings } = this;
+    viewer.set_technique(id);
+    settings.technique = id;
+    for (const key of [...settings.values.keys()].filter((name) => !name.includes('.'))) settings.values.delete(key);
+    if (!techniqueOf(id)?.views.includes(settings.view)) settings.view = 'radiance';
+    viewer.set_view(settings.view);
+  }
+
+  private source(): SceneSource {
+    if (!this.shown) throw invalid('There is no scene yet.');
+    return this.shown.source;
+  }
+
+  private surroundingsFor(environment: string | null | undefined): Surroundings | undefined {
+    if (environment === undefined) return this.shown?.surroundings;
+    return environment === null ? undefined : surroundingsOf(environment);
+  }
+
+  /** Shows a scene seen as `view` says, or, without one, as before. */
+  private async open(source: SceneSource, surroundings: Surroundings | undefined, view: Omit<LoadOptions, 'environment'> | undefined): Promise<void> {
+    if (this.ended) throw disposed();
+    const { lights, seed } = this.settings;
+    const progress = (fraction: number, what: string) => this.emit('progress', { fraction, what });
+    progress(0, 'Loading');
+    // All that can start at once does: the wasm module, the adapter, the worker.
+    const loading = this.loader.load(compileWasm(), { source, surroundings, lights, seed }, progress);
+    loading.catch(() => undefined);
+    await this.start();
+    const { flat, contents = noContents } = await loading;
+    progress(1, 'Starting the renderer');
+    await this.inTurn(async () => {
+      const scene = (viewer: Viewer): Scene => ({ source, surroundings, contents, cameras: camerasOf(viewer), report: reportOf(viewer) });
+      if (this.viewer) await this.loop.change((viewer) => this.replaceScene(viewer, flat, view, scene));
+      else await this.createViewer(flat, view, scene);
+      this.flat = flat;
+      this.settings.environment = surroundings?.bytes ? undefined : surroundings?.name;
+      this.settings.scene = { builtin: source.name, address: source.kind === 'address' ? source.address : '', file: undefined }[source.kind];
+    });
+    if (this.shown) this.emit('load', this.shown);
+  }
+
+  /** Once: is there WebGPU, and the module? */
+  private async start(): Promise<void> {
+    this.started ??= Promise.all([findAdapter(), startWasm()]).then(([{ software }]) => this.resolution.startAt(software ? 0.25 : 1));
+    try {
+      await this.started;
+    } catch (error) {
+      this.started = undefined;
+      this.loader.cancel();
+      throw error;
+    }
+  }
+
+  private async replaceScene(
+    viewer: Viewer,
+    flat: Uint8Array,
+    view: Omit<LoadOptions, 'environment'> | undefined,
+    scene: (viewer: Viewer) => Scene,
+  ): Promise<void> {
+    await viewer.load(flat);
+    if (view) Object.assign(this.settings, { camera: '0', pose: undefined, time: 0, animation: '0' }, view);
+    else this.settings.pose = this.orbit.toCamera();
+    this.shown = scene(viewer);
+    this.takeView(viewer);
+  }
+
+  private async createViewer(flat: Uint8Array, view: Omit<LoadOptions, 'environment'> = {}, scene?: (viewer: Viewer) => Scene): Promise<void> {
+    const size = this.resolution.size();
+    const viewer = await Viewer.create(this.canvas, flat, ...size);
+    if (this.ended) {
+      viewer.free();
+      throw disposed();
+    }
+    this.viewer = viewer;
+    this.rendered = size;
+    Object.assign(this.settings, view);
+    if (scene) this.shown = scene(viewer);
+    this.takeSettings(viewer);
+    this.takeView(viewer);
+    this.loop.attach(viewer);
+  }
+
+  private rebuild(): Promise<void> {
+    return this.inTurn(async () => {
+      if (!this.flat) throw invalid('There is no scene yet.');
+      this.freeViewer();
+      if (!this.accumulating) this.settings.time = this.moment;
+      await this.createViewer(this.flat);
+      this.emit('restored', null);
+    });
+  }
+
+  private freeViewer(): void {
+    this.viewer?.free();
+    this.viewer = undefined;
+  }
+
+  /** Runs `work`; where it throws, says so and goes on with what `drop` puts in its place. */
+  private attempt(setting: string, work: () => void, drop: () => void): void {
+    try {
+      work();
+    } catch (error) {
+      this.emit('error', { ...toFailure(error), setting });
+      drop();
+    }
+  }
+
+  /** Gives a new viewer all settings. */
+  private takeSettings(viewer: Viewer): void {
+    const { settings } = this;
+    const standard = defaultSettings();
+    this.attempt(`technique=${settings.technique}`, () => viewer.set_technique(settings.technique), () => {
+      settings.technique = standard.technique;
+      viewer.set_technique(standard.technique);
+    });
+    for (const [key, value] of settings.values) {
+      this.attempt(`${key}=${value}`, () => viewer.set(key, value), () => settings.values.delete(key));
+    }
+    this.attempt(`view=${settings.view}`, () => viewer.set_view(settings.view), () => (settings.view = standard.view));
+    viewer.set_seed(settings.seed);
+  }
+
+  /** Gives the viewer of a new scene its moment and its camera. */
+  private takeView(viewer: Viewer): void {
+    const { settings } = this;
+    if (settings.animation !== '0') {
+      const { animation } = settings;
+      this.attempt(`animation=${animation}`, () => viewer.set_animation(animation), () => (settings.animation = '0'));
+    }
+    viewer.set_speed(settings.speed);
+    viewer.set_time(settings.time);
+    viewer.set_accumulate(this.accumulating);
+    const first = () => this.followCamera(viewer, '0');
+    const { pose, camera } = settings;
+    if (pose) this.attempt('pose', () => this.takePose(viewer, pose), first);
+    else if (this.shown?.cameras.length) this.attempt(`camera=${camera}`, () => this.followCamera(viewer, camera), first);
+  }
+
+  // Cameras
+
+  private indexOfCamera(camera: string): number | undefined {
+    const cameras = this.shown?.cameras ?? [];
+    const named = cameras.findIndex(({ name }) => name === camera);
+    const index = named >= 0 ? named : Number(camera || NaN);
+    return cameras[index] && index;
+  }
+
+  private followCamera(viewer: Viewer, camera: string): void {
+    const index = this.indexOfCamera(camera);
+    if (index === undefined) {
+      const names = (this.shown?.cameras ?? []).map(({ name }, at) => name || at).join(', ');
+      throw { code: 'UNKNOWN_NAME', message: `the scene has no camera ${camera}; there are: ${names}` };
+    }
+    viewer.follow_camera(index);
+    Object.assign(this.settings, { camera, pose: undefined });
+    this.orbit.set(JSON.parse(viewer.camera()) as Camera, viewer.bounds());
+  }
+
+  /** Looks from `pose` through the lens of the chosen camera. */
+  private takePose(viewer: Viewer, pose: Pose): void {
+    const posed: Camera = { ...(this.shown?.cameras[this.cameraIndex] ?? { vertical_fov: 0.8 }), ...pose };
+    viewer.set_camera(JSON.stringify(posed));
+    this.settings.pose = pose;
+    this.orbit.set(posed, viewer.bounds());
+  }
+
+  /** Whether the picture is seen through a camera that moves by itself. */
+  private followsCamera(): boolean {
+    return this.settings.pose === undefined && (this.shown?.report.moving_cameras.includes(this.cameraIndex) ?? false);
+  }
+
+  // Frames
+
+  private beforeFrame(viewer: Viewer, seconds: number): boolean {
+    const moved = this.input?.controls.update(seconds) ?? false;
+    if (moved) {
+      const camera = this.camera();
+      viewer.set_camera(JSON.stringify(camera));
+      this.settings.pose = camera;
+      this.emit('camera-change', camera);
+    }
+    const [width, height] = this.resolution.size();
+    const resized = width !== this.rendered[0] || height !== this.rendered[1];
+    if (resized) {
+      viewer.resize(width, height);
+      this.rendered = [width, height];
+    }
+    return moved || resized;
+  }
+
+  private afterFrame(viewer: Viewer, milliseconds: number): void {
+    this.resolution.observe(milliseconds);
+    this.moment = viewer.time();
+    // The user takes over from where the camera is.
+    if (this.followsCamera()) this.orbit.set(JSON.parse(viewer.camera()) as Camera, viewer.bounds());
+    const [width, height] = this.rendered;
+    this.emit('sample', { count: viewer.frames(), milliseconds, width, height, time: this.moment, complete: this.loop.isComplete(viewer) });
+  }
+
+  private picture(): Promise<ImageData> {
+    return this.call(async (viewer) => {
+      const [width, height] = this.rendered;
+      const bytes = (await viewer.read_display()) as Uint8Array;
+      return new ImageData(Uint8ClampedArray.from(bytes), width, height);
+    });
+  }
+
+  // Losses
+
+  private failed(thrown: unknown): void {
+    const failure = toFailure(thrown);
+    if (failure.code !== 'DEVICE') return this.halt(failure);
+    const now = performance.now();
+    this.losses = [...this.losses.filter((time) => now - time < lossesWithin), now];
+    const final = this.losses.length >= mostLosses;
+    this.emit('devicelost', { message: failure.message, final });
+    if (final) this.halt(failure);
+    else this.rebuild().catch((error: unknown) => this.halt(toFailure(error)));
+  }
+
+  /** The renderer is gone, and with it all that waits for it. */
+  private halt(failure: Failure): void {
+    this.loop.stop(new RestirError(failure));
+    this.emit('error', { ...failure, stopped: true });
+  }
+}
+
+const camerasOf = (viewer: Viewer) => JSON.parse(viewer.cameras()) as Camera[];
+const reportOf = (viewer: Viewer) => JSON.parse(viewer.info()) as SceneReport;
