@@ -203,7 +203,12 @@ fn what_makes_no_sense_is_refused() {
         ("[quick]", "[[sweep]]\nkey = \"light_samples\"\nvalues = [1]\n[quick]", "UNKNOWN_NAME", "light_samples"),
         ("[quick]", "[[sweep]]\nkey = \"scene\"\nvalues = [\"x\"]\n[quick]", "BAD_FILE", "'*'"),
         ("[quick]", "[[sweep]]\nkey = \"size\"\nvalues = [\"640\"]\n[quick]", "BAD_FILE", "WIDTHxHEIGHT"),
-        ("[quick]", "[[sweep]]\nkey = \"indirect\"\nvalues = [true]\n[quick]", "BAD_FILE", "'indirect' is swept"),
+        (
+            "name = \"restir-di\"",
+            "name = \"restir-di\"\nsettings = { history_cap = 3 }\n[[sweep]]\nkey = \"history_cap\"\nvalues = [4]",
+            "BAD_FILE",
+            "'history_cap' is swept",
+        ),
         ("[quick]", "[[sweep]]\nkey = \"render.seed\"\nvalues = [4, 4]\n[quick]", "BAD_FILE", "twice"),
         ("metrics = [\"mse\",", "metrics = [\"mse\", \"mse\",", "BAD_FILE", "twice"),
         ("name = \"restir-di\"", "name = \"\"", "BAD_FILE", "empty name"),

@@ -51,6 +51,8 @@ class App {
     const { view } = this;
     const { scene = defaultScene, environment } = this.query.state;
     view.controls = 'orbit';
+    // On a small screen the picture comes first.
+    if (matchMedia('(max-width: 30rem)').matches) this.fold();
     this.follow();
     const opening = view.load(scene, { environment });
     try {

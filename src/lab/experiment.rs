@@ -406,13 +406,11 @@ impl Experiment {
             return bad("sweep", "scenes and sizes can be swept first only".into());
         }
         let keys: Vec<&str> = self.sweeps.iter().map(|sweep| sweep.key.as_str()).collect();
-        let settings =
-            self.scenes.iter().map(|place| &place.settings).chain(self.series.iter().map(|series| &series.settings));
-        for (key, settings) in
-            keys.iter().flat_map(|key| settings.clone().chain([&self.settings]).map(move |all| (*key, all)))
-        {
-            if settings.contains_key(key) {
-                return bad("sweep", format!("'{key}' is swept, and set by [settings], a scene or a series as well"));
+        // A swept value takes the place of a shared one; with a scene's or a series' own it would be a contradiction.
+        let places = self.scenes.iter().map(|place| &place.settings);
+        for settings in places.chain(self.series.iter().map(|series| &series.settings)) {
+            if let Some(key) = keys.iter().find(|key| settings.contains_key(**key)) {
+                return bad("sweep", format!("'{key}' is swept, and a scene or a series sets it as well"));
             }
         }
         if has_twins(&keys) || self.sweeps.iter().any(|sweep| has_twins(&sweep.values)) {

@@ -71,8 +71,7 @@ fn load(name: &str, choice: &Choice) -> Result<Scene> {
         return builtin::make(builtin).map_err(Failure::from_option).and_then(only_gltf);
     }
     let path = Path::new(name);
-    let options =
-        gltf::Options { scene: choice.scene_index, variant: choice.variant.as_deref(), ..gltf::Options::default() };
+    let options = gltf::Options { scene: choice.scene_index, variant: choice.variant.as_deref() };
     match extension(path).as_str() {
         "glb" | "gltf" => gltf::load_file(path, &options).map_err(Failure::from_option),
         "obj" => obj::load_file(path).map_err(Failure::from).and_then(only_gltf),
