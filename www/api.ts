@@ -78,6 +78,17 @@ export interface Stats {
   passes: { name: string; ms: number }[];
 }
 
+/** What `Viewer.errors()` resolves to: distances of the picture from the reference, of linear radiance. */
+export interface Errors {
+  mse: number;
+  /** Squared error over the squared reference plus 0.01. */
+  relmse: number;
+  /** Mean absolute error of luminance, a fraction; null where the reference is black. */
+  mape: number | null;
+  /** Signed difference of mean luminance, a fraction; null where the reference is black. */
+  bias: number | null;
+}
+
 /** What `Viewer.info()` returns: what the renderer has, and what was left out or repaired while the scene was read. */
 export interface SceneReport {
   warnings: string[];

@@ -3,6 +3,7 @@ import type { Description, SceneReport, Stats, TechniqueInfo } from './api.js';
 import { acceptDrops } from './files.js';
 import { byId, clearError, showError, showProgress, showStatus, showWarnings } from './notices.js';
 import { commandLine } from './command.js';
+import { ErrorMeter } from './error-meter.js';
 import { type Group, fillMenu, filterPanel, showPanel } from './panel.js';
 import type { Contents, SceneSource } from './protocol.js';
 import { TimeControls } from './time.js';
@@ -43,9 +44,10 @@ class App {
   private stats: Stats | undefined;
   private statsTime = 0;
   private urlTimer = 0;
-  /** Of the last frame: rendered pixels, and frames in the picture. */
+  /** Of the last frame: rendered pixels, frames in the picture, and the scene's moment. */
   private size: [number, number] = [1280, 720];
   private frames = 0;
+  private moment = 0;
 
   async start(): Promise<void> {
     const { view } = this;
@@ -54,6 +56,7 @@ class App {
     // On a small screen the picture comes first.
     if (matchMedia('(max-width: 30rem)').matches) this.fold();
     this.follow();
+    new ErrorMeter(view);
     const opening = view.load(scene, { environment });
     try {
       this.description = await RestirViewer.describe();
@@ -65,10 +68,15 @@ class App {
     try {
       await opening;
     } catch (problem) {
-      // Without what could not be had: first the environment, then the scene.
-      if (environment !== undefined) await this.settle(view.load(scene, { environment: null }));
-      if (!view.scene) await this.settle(view.load(defaultScene, { environment: null }));
-      if (view.scene) showError(problem);
+      // The user has chosen something else meanwhile.
+      if (view.loading) return;
+      // Without what could not be had: first the environment, then the scene, and with that how it was to be seen.
+      if (environment !== undefined && !view.scene) await this.settle(view.load(scene, { environment: null }));
+      if (!view.scene) {
+        Object.assign(view.settings, { camera: '0', pose: undefined, time: 0, animation: '0' });
+        await this.settle(view.load(defaultScene, { environment: null }));
+      }
+      if (view.scene && (problem as { code?: unknown }).code !== 'CANCELLED') showError(problem);
     }
   }
 
@@ -107,7 +115,8 @@ class App {
     const { report, cameras, contents } = scene;
     clearError();
     showProgress(undefined);
-    showWarnings([...this.query.warnings, ...report.warnings]);
+    // Those of the address are told once.
+    showWarnings([...this.query.warnings.splice(0), ...report.warnings]);
     fillMenu(menu('camera'), cameras.map((camera, index) => [String(index), camera.name || `camera ${index}`]), String(this.view.cameraIndex));
     this.showMenus();
     this.showSources(scene);
@@ -155,10 +164,16 @@ class App {
   private async settled(change: Promise<void>): Promise<void> {
     await change.catch(() => undefined);
     this.showMenus();
+    this.showAccumulate(this.view.accumulating);
   }
 
   private setParam(key: string, value: string | undefined): void {
-    void this.view.setParam(key, value).then(() => this.showPresets(), () => undefined);
+    const changed = () => {
+      this.showPresets();
+      this.showAccumulate(this.view.accumulating);
+    };
+    // What was refused is shown as it was.
+    void this.view.setParam(key, value).then(changed, () => this.showMenus());
   }
 
   private showPresets(): void {
@@ -214,7 +229,11 @@ class App {
     menu('scene').addEventListener('change', () => void this.settle(view.load(menu('scene').value)));
     menu('environment').addEventListener('change', () => void this.settle(view.setEnvironment(menu('environment').value || null)));
     menu('technique').addEventListener('change', () => void this.settled(view.setTechnique(menu('technique').value)));
-    menu('preset').addEventListener('change', () => menu('preset').value && void this.settled(view.setPreset(menu('preset').value)));
+    menu('preset').addEventListener('change', () => {
+      const { value } = menu('preset');
+      // None is no settings of its own: the technique's defaults.
+      void this.settled(value ? view.setPreset(value) : view.setTechnique(view.settings.technique));
+    });
     const search = byId('search', HTMLInputElement);
     search.addEventListener('input', () => filterPanel(byId('panel', HTMLElement), search.value));
     menu('view').addEventListener('change', () => void view.setView(menu('view').value));
@@ -238,6 +257,7 @@ class App {
       view.step();
     });
     button('reset').addEventListener('click', () => void view.reset());
+    byId('timing', HTMLDetailsElement).addEventListener('toggle', () => this.stats && showTiming(this.stats));
     button('save').addEventListener('click', () => void this.save());
     button('copy-link').addEventListener('click', () => void this.copy(button('copy-link'), view.shareUrl(location.href)));
     button('copy-command').addEventListener('click', () => void this.copy(button('copy-command'), this.command()));
@@ -248,7 +268,7 @@ class App {
   }
 
   private shortcut(event: KeyboardEvent): void {
-    const typing = event.target instanceof Element && event.target.closest('button, input, select, summary');
+    const typing = event.target instanceof Element && event.target.closest('a, button, dialog, input, select, summary');
     if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
     const buttons: Record<string, string> = { ' ': 'pause', '.': 'step', r: 'reset', h: 'fold', p: 'play', '?': 'keys' };
     const id = buttons[event.key];
@@ -281,7 +301,7 @@ class App {
 
   private command(): string {
     const { view } = this;
-    return commandLine(view.settings, view.scene?.source.name ?? '', this.size, this.frames);
+    return commandLine(view.settings, view.scene?.source.name ?? '', this.moment, this.size, this.frames);
   }
 
   /** Copies text, and says on the button that it has, or what went wrong. */
@@ -310,7 +330,7 @@ class App {
     performance.mark('picture');
     this.time.showTime(sample.time);
     const { count: frames, milliseconds, width, height, complete } = sample;
-    [this.size, this.frames] = [[width, height], frames];
+    [this.size, this.frames, this.moment] = [[width, height], frames, sample.time];
     const show = () => {
       const adapter = this.view.scene?.report.adapter ?? '';
       showStatus({ frames, milliseconds, size: [width, height], adapter, stats: this.stats });

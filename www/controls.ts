@@ -108,9 +108,9 @@ export class Controls {
   private key(event: KeyboardEvent, isDown: boolean): void {
     this.fast = event.shiftKey;
     const known = event.code in flyKeys || event.code in turnKeys || event.code in zoomKeys;
+    if (!isDown) this.pressed.delete(event.code);
     if (!known || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
     if (isDown) this.pressed.add(event.code);
-    else this.pressed.delete(event.code);
   }
 }

@@ -21,3 +21,8 @@ export function parameterOf(technique: string, key: string): Parameter | undefin
 export function isDefault(parameter: Parameter, text: string): boolean {
   return typeof parameter.default === 'number' ? Number(text) === parameter.default : text === String(parameter.default);
 }
+
+/** The value `text` as the module writes it: it reads `yes`, `on` and `1` as well. */
+export function normalised(parameter: Parameter | undefined, text: string): string {
+  return parameter?.kind === 'bool' ? String(['true', 'yes', 'on', '1'].includes(text)) : text;
+}

@@ -128,7 +128,9 @@ export class RestirViewerElement extends HTMLElement {
       this.progress.value = detail.fraction;
     });
     viewer.addEventListener('sample', () => (this.poster.hidden = this.hasPicture = true));
-    for (const type of ['load', 'restored'] as const) viewer.addEventListener(type, () => this.clear());
+    // What the load has just complained of stays.
+    viewer.addEventListener('load', () => (this.progress.hidden = true));
+    viewer.addEventListener('restored', () => this.clear());
     viewer.addEventListener('error', ({ detail }) => this.showFailure(detail));
     for (const type of passedOn) {
       viewer.addEventListener(type, (event) => this.dispatchEvent(new CustomEvent(type, { detail: (event as CustomEvent<unknown>).detail })));
@@ -208,8 +210,14 @@ export class RestirViewerElement extends HTMLElement {
     if (this.changed('src')) {
       const environment = this.getAttribute('environment');
       this.changed('environment', 'camera', 'time');
-      const place = camera();
-      void viewer.load(source, { environment, time: time(), ...(typeof place === 'string' ? { camera: place } : { pose: place }) });
+      let place: string | Pose = '0';
+      try {
+        place = camera();
+      } catch (error) {
+        this.showFailure(toFailure(error));
+      }
+      const loading = viewer.load(source, { environment, time: time(), ...(typeof place === 'string' ? { camera: place } : { pose: place }) });
+      loading.catch(() => (this.progress.hidden = !viewer.loading));
       return;
     }
     if (this.changed('environment')) void viewer.setEnvironment(this.getAttribute('environment'));
@@ -235,9 +243,11 @@ export class RestirViewerElement extends HTMLElement {
 
   private applyParameters(viewer: RestirViewer): void {
     const wanted = parametersOf(this.getAttribute('params'));
-    for (const name of this.parameters.keys()) if (!wanted.has(name)) void viewer.setParam(name, undefined);
-    for (const [name, value] of wanted) if (this.parameters.get(name) !== value) void viewer.setParam(name, value);
+    const before = this.parameters;
     this.parameters = wanted;
+    // Back to defaults first: the old and the new may contradict each other.
+    for (const [name, value] of before) if (wanted.get(name) !== value) void viewer.setParam(name, undefined);
+    for (const [name, value] of wanted) if (before.get(name) !== value) viewer.setParam(name, value).catch(() => wanted.delete(name));
   }
 }
 

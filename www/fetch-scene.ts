@@ -53,8 +53,17 @@ export async function fetchScene(name: string, address: string): Promise<Map<str
   const files = new Map<string, Uint8Array>();
   const take = async (uri: string, url: string): Promise<void> => {
     if (files.has(decoded(uri))) return;
+    const others = files.size > 0;
     files.set(decoded(uri), new Uint8Array());
-    const bytes = await fetchBytes(uri, url);
+    let bytes: Uint8Array;
+    try {
+      bytes = await fetchBytes(uri, url);
+    } catch (error) {
+      // What is missing beside an OBJ is a warning, or not needed: its reader says so.
+      if (!others || !/\.obj$/i.test(name)) throw error;
+      files.delete(decoded(uri));
+      return;
+    }
     files.set(decoded(uri), bytes);
     await Promise.all(namedBy(uri, bytes).map((other) => take(other, new URL(other, address).href)));
   };

@@ -22,7 +22,9 @@ export async function readDropped(files: readonly File[]): Promise<{ source?: Sc
 
 /** What the address or the menu calls: a name that the module knows, or the address of a map. */
 export function surroundingsOf(text: string): Surroundings {
-  return /^(sky|white)(:|$)/.test(text) ? { name: text } : { name: text, address: new URL(text, document.baseURI).href };
+  if (/^(sky|white)(:|$)/.test(text)) return { name: text };
+  if (!URL.canParse(text, document.baseURI)) throw { code: 'BAD_VALUE', message: `${text} is no address.` };
+  return { name: text, address: new URL(text, document.baseURI).href };
 }
 
 /**

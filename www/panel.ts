@@ -66,7 +66,9 @@ function numeric(id: string, parameter: Parameter, changed: (text: string) => vo
   });
   const show = (text: string) => {
     input.value = text;
-    slider.value = String(to(Number(text)));
+    slider.setAttribute('aria-valuetext', text);
+    // While it is held it is where the hand has put it: a step of a power may be less than a whole number.
+    if (!slider.matches(':focus')) slider.value = String(to(Number(text)));
   };
   return { elements: [slider, input], show };
 }

@@ -71,6 +71,8 @@ export class RenderLoop {
         try {
           resolve(await work(viewer));
         } catch (error) {
+          // The frame that follows tells of a lost device, which nothing else looks after.
+          if ((error as { code?: unknown } | undefined)?.code === 'DEVICE') this.changed = true;
           refuse(error);
         }
       };

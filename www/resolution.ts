@@ -3,7 +3,7 @@
 const slowest = 0.25;
 const slowFrame = 100;
 /** WebGPU's default limit on a texture's side. */
-const longestSide = 8192;
+export const longestSide = 8192;
 
 export class Resolution {
   /** What the user asked for; undefined adapts. */

@@ -48,7 +48,8 @@ export class TimeControls {
     const names = report.animations.map(({ name }, index): [string, string] => [String(index), name]);
     fillMenu(this.animations, names.length > 0 ? names : [['0', 'everything']], String(chosen));
     this.animations.disabled = names.length < 2;
-    this.speedMenu.value = String(speed);
+    const speeds = [...this.speedMenu.options].map(({ value, text }): [string, string] => [value, text]);
+    fillMenu(this.speedMenu, speeds, String(speed));
     this.showDuration();
   }
 

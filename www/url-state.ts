@@ -1,5 +1,6 @@
 // What determines a picture, and how a URL's query says it, so that a link is a picture. Keys of parameters are those of --set.
 import type { Pose, Vector } from './api.js';
+import { longestSide } from './resolution.js';
 
 /** What a command line renders by default, too. */
 export const defaultTechnique = 'restir-di';
@@ -65,7 +66,7 @@ function integer(text: string, low: number, high: number): number {
 function size(text: string): [number, number] {
   const found = /^(\d+)x(\d+)$/.exec(text);
   if (!found) throw new Error('must be WIDTHxHEIGHT in pixels');
-  return [integer(found[1] ?? '', 1, 16384), integer(found[2] ?? '', 1, 16384)];
+  return [integer(found[1] ?? '', 1, longestSide), integer(found[2] ?? '', 1, longestSide)];
 }
 
 function scale(text: string): number {

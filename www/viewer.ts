@@ -1,9 +1,9 @@
 // A scene on a canvas: loads it, renders it, moves its camera, and starts again when the device is lost. Knows no page.
 import { findAdapter } from './adapter.js';
-import type { Camera, Description, Failure, Pose, SceneReport, Stats } from './api.js';
+import type { Camera, Description, Errors, Failure, Pose, SceneReport, Stats } from './api.js';
 import { OrbitCamera } from './camera.js';
 import { Controls } from './controls.js';
-import { description, isDefault, parameterOf, techniqueOf } from './description.js';
+import { description, isDefault, normalised, parameterOf, techniqueOf } from './description.js';
 import { readDropped, sourceOf, surroundingsOf } from './files.js';
 import { SceneLoader } from './loader.js';
 import { RestirError, toFailure } from './messages.js';
@@ -14,7 +14,7 @@ import { Resolution } from './resolution.js';
 import { type Settings, defaultSettings, writeQuery } from './url-state.js';
 import { compileWasm, startWasm } from './wasm.js';
 
-export type { Camera, Choice, Contents, Description, Failure, Pose, SceneReport, Settings, Stats };
+export type { Camera, Choice, Contents, Description, Errors, Failure, Pose, SceneReport, Settings, Stats };
 export { RestirError };
 
 /** One frame. */
@@ -93,6 +93,9 @@ export interface LoadOptions {
   time?: number;
 }
 
+/** How a scene is seen when it opens. */
+type View = Omit<LoadOptions, 'environment'>;
+
 const noContents: Contents = { scenes: [], scene: 0, variants: [] };
 /** So many losses within so many milliseconds, and the viewer gives up. */
 const [mostLosses, lossesWithin] = [2, 30_000];
@@ -125,6 +128,8 @@ export class RestirViewer extends EventTarget {
   private input: { controls: Controls; end: AbortController } | undefined;
   private viewer: Viewer | undefined;
   private shown: Scene | undefined;
+  /** What is being loaded: what is asked for meanwhile starts from it. */
+  private wanted: { source: SceneSource; surroundings: Surroundings | undefined; view: View | undefined } | undefined;
   /** The scene as the worker made it: a lost device is rebuilt from it. */
   private flat: Uint8Array | undefined;
   private started: Promise<void> | undefined;
@@ -160,21 +165,24 @@ export class RestirViewer extends EventTarget {
    * abandoned: it rejects with `CANCELLED`. Rejects with `IO`, `BAD_FILE`, `UNSUPPORTED`, `UNKNOWN_NAME`, `LIMIT`, `NO_WEBGPU`, ...
    */
   load(scene: string, { environment, ...view }: LoadOptions = {}): Promise<void> {
-    const given = Object.fromEntries(Object.entries(view).filter(([, value]) => value !== undefined));
-    return this.reported(async () => this.open(sourceOf(scene), this.surroundingsFor(environment), given));
+    const given = Object.fromEntries(Object.entries(view).filter(([, value]) => value !== undefined)) as View;
+    return this.reported(async () => {
+      if (given.time !== undefined) checkRange('time', given.time, -1e9, 1e9);
+      await this.open(sourceOf(scene), this.surroundingsFor(environment), given);
+    });
   }
 
   /** Shows files that were picked or dropped: a scene, an environment map, or both. Rejects also with `NOT_A_SCENE`. */
   loadFiles(files: readonly File[]): Promise<void> {
     return this.reported(async () => {
-      const { source, surroundings = this.shown?.surroundings } = await readDropped(files);
-      await this.open(source ?? this.source(), surroundings, source ? {} : undefined);
+      const { source, surroundings = this.surroundingsFor(undefined) } = await readDropped(files);
+      await this.open(source ?? this.source(), surroundings, source ? {} : this.wanted?.view);
     });
   }
 
   /** Surrounds the scene by `sky...`, `white` or the map at an address; null gives it back its own environment. */
   setEnvironment(environment: string | null): Promise<void> {
-    return this.reported(async () => this.open(this.source(), this.surroundingsFor(environment), undefined));
+    return this.reported(async () => this.open(this.source(), this.surroundingsFor(environment), this.wanted?.view));
   }
 
   /** Shows another scene or variant of the file that is shown; does nothing for a built-in scene. */
@@ -182,8 +190,8 @@ export class RestirViewer extends EventTarget {
     return this.reported(async () => {
       const source = this.source();
       if (source.kind === 'builtin') return;
-      const view = choice.scene === undefined ? undefined : {};
-      await this.open({ ...source, choice: { ...source.choice, ...choice } }, this.shown?.surroundings, view);
+      const view = choice.scene === undefined ? this.wanted?.view : {};
+      await this.open({ ...source, choice: { ...source.choice, ...choice } }, this.surroundingsFor(undefined), view);
     });
   }
 
@@ -224,6 +232,7 @@ export class RestirViewer extends EventTarget {
         viewer.set(key, value);
         values.set(key, value);
       }
+      viewer.set_accumulate(this.accumulating);
     });
   }
 
@@ -241,10 +250,10 @@ export class RestirViewer extends EventTarget {
   setParam(name: string, value: string | number | boolean | undefined): Promise<void> {
     const work = (viewer: Viewer) => {
       const parameter = parameterOf(this.settings.technique, name);
-      const text = String(value ?? parameter?.default);
-      viewer.set(name, text);
-      if (parameter && isDefault(parameter, text)) this.settings.values.delete(name);
-      else this.settings.values.set(name, text);
+      if (value === undefined && !parameter) return void this.settings.values.delete(name);
+      this.takeValue(viewer, name, String(value ?? parameter?.default));
+      // Whether time runs may hang on it: an environment that turns moves.
+      if (name.startsWith('render.')) viewer.set_accumulate(this.accumulating);
     };
     return this.set(name, value, work, name.startsWith('film.'));
   }
@@ -445,6 +454,20 @@ export class RestirViewer extends EventTarget {
     return this.call(async (viewer) => JSON.parse((await viewer.stats()) as string) as Stats);
   }
 
+  /** Keeps the averaged picture as the reference of `errors`, and its size in pixels from now on, for only alike ones are compared. */
+  keepReference(): Promise<void> {
+    return this.reported(async () => {
+      await this.call((viewer) => viewer.keep_reference());
+      this.settings.size = this.resolution.fixedSize = [...this.rendered];
+      this.emit('param-change', { name: 'size', value: this.rendered.join('x') });
+    });
+  }
+
+  /** How far the picture is from the reference. Rejects with `BAD_VALUE` where there is none, or one of another size. */
+  errors(): Promise<Errors> {
+    return this.call(async (viewer) => JSON.parse((await viewer.errors()) as string) as Errors);
+  }
+
   /** Runs work on the wasm module's own viewer between two frames; for what has no method here. */
   call<T>(work: (viewer: Viewer) => T | Promise<T>): Promise<T> {
     return this.loop.call(work);
@@ -463,6 +486,7 @@ export class RestirViewer extends EventTarget {
     this.ended = true;
     this.controls = 'none';
     this.loader.cancel();
+    this.flat = undefined;
     void this.loop.end(disposed()).then(() => this.inTurn(async () => this.freeViewer()));
   }
 
@@ -497,6 +521,15 @@ export class RestirViewer extends EventTarget {
     return this.reported(() => (onlyFilm ? this.loop.call(apply) : this.loop.change(apply)));
   }
 
+  private takeValue(viewer: Viewer, key: string, value: string): void {
+    const { technique, values } = this.settings;
+    const parameter = parameterOf(technique, key);
+    viewer.set(key, value);
+    const text = normalised(parameter, value);
+    if (parameter && isDefault(parameter, text)) values.delete(key);
+    else values.set(key, text);
+  }
+
   private takeTechnique(viewer: Viewer, id: string): void {
     const { settings } = this;
     viewer.set_technique(id);
@@ -507,18 +540,29 @@ export class RestirViewer extends EventTarget {
   }
 
   private source(): SceneSource {
-    if (!this.shown) throw invalid('There is no scene yet.');
-    return this.shown.source;
+    const { source } = this.wanted ?? this.shown ?? {};
+    if (!source) throw invalid('There is no scene yet.');
+    return source;
   }
 
   private surroundingsFor(environment: string | null | undefined): Surroundings | undefined {
-    if (environment === undefined) return this.shown?.surroundings;
-    return environment === null ? undefined : surroundingsOf(environment);
+    if (environment === undefined) return (this.wanted ?? this.shown)?.surroundings;
+    return environment === null || environment === '' ? undefined : surroundingsOf(environment);
   }
 
   /** Shows a scene seen as `view` says, or, without one, as before. */
-  private async open(source: SceneSource, surroundings: Surroundings | undefined, view: Omit<LoadOptions, 'environment'> | undefined): Promise<void> {
+  private async open(source: SceneSource, surroundings: Surroundings | undefined, view: View | undefined): Promise<void> {
     if (this.ended) throw disposed();
+    const wanted = (this.wanted = { source, surroundings, view });
+    try {
+      await this.show(source, surroundings, view);
+    } finally {
+      if (this.wanted === wanted) this.wanted = undefined;
+    }
+    if (this.shown) this.emit('load', this.shown);
+  }
+
+  private async show(source: SceneSource, surroundings: Surroundings | undefined, view: View | undefined): Promise<void> {
     const { lights, seed } = this.settings;
     const progress = (fraction: number, what: string) => this.emit('progress', { fraction, what });
     progress(0, 'Loading');
@@ -528,15 +572,19 @@ export class RestirViewer extends EventTarget {
     await this.start();
     const { flat, contents = noContents } = await loading;
     progress(1, 'Starting the renderer');
-    await this.inTurn(async () => {
-      const scene = (viewer: Viewer): Scene => ({ source, surroundings, contents, cameras: camerasOf(viewer), report: reportOf(viewer) });
-      if (this.viewer) await this.loop.change((viewer) => this.replaceScene(viewer, flat, view, scene));
-      else await this.createViewer(flat, view, scene);
+    const take = (viewer: Viewer): void => {
+      this.shown = { source, surroundings, contents, cameras: camerasOf(viewer), report: reportOf(viewer) };
       this.flat = flat;
       this.settings.environment = surroundings?.bytes ? undefined : surroundings?.name;
       this.settings.scene = { builtin: source.name, address: source.kind === 'address' ? source.address : '', file: undefined }[source.kind];
+    };
+    // Only a viewer is made in turn: a device lost meanwhile is replaced in turn, too, and the loop waits for that.
+    const made = await this.inTurn(async () => {
+      if (!this.viewer) await this.createViewer(flat, view, take);
+      else return false;
+      return true;
     });
-    if (this.shown) this.emit('load', this.shown);
+    if (!made) await this.loop.change((viewer) => this.replaceScene(viewer, flat, view, take));
   }
 
   /** Once: is there WebGPU, and the module? */
@@ -551,20 +599,16 @@ export class RestirViewer extends EventTarget {
     }
   }
 
-  private async replaceScene(
-    viewer: Viewer,
-    flat: Uint8Array,
-    view: Omit<LoadOptions, 'environment'> | undefined,
-    scene: (viewer: Viewer) => Scene,
-  ): Promise<void> {
+  private async replaceScene(viewer: Viewer, flat: Uint8Array, view: View | undefined, take: (viewer: Viewer) => void): Promise<void> {
     await viewer.load(flat);
+    // What runs goes on from where it is.
     if (view) Object.assign(this.settings, { camera: '0', pose: undefined, time: 0, animation: '0' }, view);
-    else this.settings.pose = this.orbit.toCamera();
-    this.shown = scene(viewer);
+    else if (!this.accumulating) this.settings.time = this.moment;
+    take(viewer);
     this.takeView(viewer);
   }
 
-  private async createViewer(flat: Uint8Array, view: Omit<LoadOptions, 'environment'> = {}, scene?: (viewer: Viewer) => Scene): Promise<void> {
+  private async createViewer(flat: Uint8Array, view: View = {}, take?: (viewer: Viewer) => void): Promise<void> {
     const size = this.resolution.size();
     const viewer = await Viewer.create(this.canvas, flat, ...size);
     if (this.ended) {
@@ -574,7 +618,7 @@ export class RestirViewer extends EventTarget {
     this.viewer = viewer;
     this.rendered = size;
     Object.assign(this.settings, view);
-    if (scene) this.shown = scene(viewer);
+    take?.(viewer);
     this.takeSettings(viewer);
     this.takeView(viewer);
     this.loop.attach(viewer);
@@ -605,7 +649,7 @@ export class RestirViewer extends EventTarget {
     }
   }
 
-  /** Gives a new viewer all settings. */
+  /** Gives a new viewer all settings, and keeps their values as the viewer writes them. */
   private takeSettings(viewer: Viewer): void {
     const { settings } = this;
     const standard = defaultSettings();
@@ -613,8 +657,8 @@ export class RestirViewer extends EventTarget {
       settings.technique = standard.technique;
       viewer.set_technique(standard.technique);
     });
-    for (const [key, value] of settings.values) {
-      this.attempt(`${key}=${value}`, () => viewer.set(key, value), () => settings.values.delete(key));
+    for (const [key, value] of [...settings.values]) {
+      this.attempt(`${key}=${value}`, () => this.takeValue(viewer, key, value), () => settings.values.delete(key));
     }
     this.attempt(`view=${settings.view}`, () => viewer.set_view(settings.view), () => (settings.view = standard.view));
     viewer.set_seed(settings.seed);
@@ -640,9 +684,9 @@ export class RestirViewer extends EventTarget {
 
   private indexOfCamera(camera: string): number | undefined {
     const cameras = this.shown?.cameras ?? [];
-    const named = cameras.findIndex(({ name }) => name === camera);
-    const index = named >= 0 ? named : Number(camera || NaN);
-    return cameras[index] && index;
+    const index = Number(camera || NaN);
+    const found = cameras[index] ? index : cameras.findIndex(({ name }) => name === camera);
+    return found >= 0 ? found : undefined;
   }
 
   private followCamera(viewer: Viewer, camera: string): void {

@@ -24,5 +24,7 @@ export function compileWasm(): Promise<WebAssembly.Module> {
 /** Resolves when the module's functions can be called. */
 export async function startWasm(): Promise<void> {
   const module = await compileWasm();
-  await (started ??= init({ module_or_path: module }));
+  started ??= init({ module_or_path: module });
+  started.catch(() => (started = undefined));
+  await started;
 }

@@ -38,7 +38,7 @@ async function gather(source: FileSource): Promise<Map<string, Uint8Array>> {
 async function flattenFile(source: FileSource, lighting: Lighting): Promise<Loaded> {
   const { name, choice } = source;
   const files = await gather(source);
-  const resolve = (uri: string) => files.get(decoded(uri)) ?? files.get(baseName(decoded(uri)));
+  const resolve = (uri: string) => files.get(uri) ?? files.get(decoded(uri)) ?? files.get(baseName(decoded(uri)));
   const main = resolve(name) ?? new Uint8Array();
   const { contents_of, flatten_file, uncook } = await startLoader();
   if (/\.restir$/i.test(name)) {

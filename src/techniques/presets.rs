@@ -88,6 +88,41 @@ pub static ALL: &[Preset] = &[
             ("render.energy_compensation", "true"),
         ],
     },
+    Preset {
+        id: "report-a",
+        title: "Report 2025, configuration A",
+        doc: "One sample of each strategy, no reuse. Made for the scene cornell-64. Unbiased.",
+        technique: "restir-report",
+        settings: &[("configuration", "a-naive")],
+    },
+    Preset {
+        id: "report-b",
+        title: "Report 2025, configuration B",
+        doc: "Eight proposals resampled for area lights and for points, no reuse. Made for the scene cornell-64. Unbiased.",
+        technique: "restir-report",
+        settings: &[("configuration", "b-ris")],
+    },
+    Preset {
+        id: "report-c",
+        title: "Report 2025, configuration C",
+        doc: "As B, with temporal reuse. Made for the scene cornell-64. Unbiased.",
+        technique: "restir-report",
+        settings: &[("configuration", "c-temporal")],
+    },
+    Preset {
+        id: "report-d",
+        title: "Report 2025, configuration D",
+        doc: "As B, with spatial reuse. Made for the scene cornell-64. Unbiased.",
+        technique: "restir-report",
+        settings: &[("configuration", "d-spatial")],
+    },
+    Preset {
+        id: "report-e",
+        title: "Report 2025, configuration E",
+        doc: "As B, with temporal and spatial reuse: the defaults. Made for the scene cornell-64. Unbiased.",
+        technique: "restir-report",
+        settings: &[],
+    },
 ];
 
 /// The preset with this id.

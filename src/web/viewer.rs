@@ -5,9 +5,12 @@ use crate::film::blit::Blit;
 use crate::gpu::{Gpu, GpuOptions, instance};
 use crate::pace::Pace;
 use crate::scene::{Camera, Projection, builtin};
-use crate::{Error, FlatScene, Renderer};
+use crate::lab::metrics;
+use crate::{Error, FlatScene, Image, Renderer};
 use glam::{UVec2, Vec3};
+use std::cell::RefCell;
 use std::pin::Pin;
+use std::rc::Rc;
 use wasm_bindgen::prelude::*;
 
 /// Runs once when the module is loaded: a panic becomes a console error with a stack.
@@ -65,6 +68,8 @@ async fn receive(bytes: &js_sys::Uint8Array, pace: &mut Pace) -> JsResult<FlatSc
 pub struct Viewer {
     renderer: Renderer,
     blit: Blit,
+    /// What `errors` compares with. Shared with the promises that read pictures back.
+    reference: Rc<RefCell<Option<Image>>>,
 }
 
 #[wasm_bindgen]
@@ -85,7 +90,7 @@ impl Viewer {
         let gpu = Gpu::from_instance(&instance, Some(&surface), &GpuOptions::default()).await.js()?;
         let blit = Blit::new(&gpu, surface);
         let renderer = Renderer::prepare(gpu, scene, UVec2::new(width, height), &mut pace).await.js()?;
-        Ok(Viewer { renderer, blit })
+        Ok(Viewer { renderer, blit, reference: Rc::default() })
     }
 
     /// Replaces the scene by another flattened one.
@@ -241,6 +246,38 @@ impl Viewer {
         let read = self.renderer.read_display();
         wasm_bindgen_futures::future_to_promise(async move {
             Ok(js_sys::Uint8Array::from(read.await.js()?.as_slice()).into())
+        })
+    }
+}
+
+#[wasm_bindgen]
+impl Viewer {
+    /// Keeps the picture, averaged and linear, as the reference.
+    pub fn keep_reference(&self) -> js_sys::Promise {
+        let (read, reference) = (self.renderer.read_image(), self.reference.clone());
+        wasm_bindgen_futures::future_to_promise(async move {
+            let image = read.await.js()?;
+            *reference.borrow_mut() = Some(image);
+            Ok(JsValue::UNDEFINED)
+        })
+    }
+
+    /// How far the picture is from the reference, as JSON: `mse`, `relmse`, `mape`, and `bias`, the signed one of mean luminance; the last two as
+    /// fractions, null where the reference is black.
+    pub fn errors(&self) -> js_sys::Promise {
+        let (read, reference) = (self.renderer.read_image(), self.reference.clone());
+        wasm_bindgen_futures::future_to_promise(async move {
+            let image = read.await.js()?;
+            let reference = reference.borrow();
+            let reference = reference.as_ref().ok_or_else(|| Error::bad_value("reference", "there is none")).js()?;
+            let [.., luminance] = metrics::bias(&image, reference).js()?;
+            let errors = serde_json::json!({
+                "mse": metrics::mse(&image, reference).js()?,
+                "relmse": metrics::relmse(&image, reference).js()?,
+                "mape": metrics::mape(&image, reference).js()?,
+                "bias": luminance.relative,
+            });
+            Ok(errors.to_string().into())
         })
     }
 }

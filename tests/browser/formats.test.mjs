@@ -120,7 +120,7 @@ test('Draco', () =>
       },
       [bytes(draco.encoded)],
     );
-    await assertTwins(page, [{ name: 'draco.glb', bytes: withDraco }], [{ name: 'twin.glb', bytes: without }]);
+    await assertTwins(page, [{ name: 'draco.glb', bytes: withDraco }], [{ name: 'a%20twin.glb', bytes: without }]);
     // What the decoder refuses is said with the file's name.
     const broken = Buffer.from(withDraco);
     broken.fill(255, broken.length - 100);

@@ -29,3 +29,19 @@ export async function cook(scene) {
     rmSync(folder, { recursive: true });
   }
 }
+
+/** What `restir compare` says of two pictures that `restir render SCENE` makes with the given options. */
+export async function compareNatively(scene, options, reference) {
+  const folder = mkdtempSync(join(tmpdir(), 'restir-native-'));
+  const env = softwareEnvironment();
+  try {
+    const files = [];
+    for (const [name, words] of [['picture.exr', options], ['reference.exr', reference]]) {
+      files.push(join(folder, name));
+      await run(['cargo', 'run', '--quiet', '--', 'render', scene, ...words, '--out', files.at(-1)], { env });
+    }
+    return JSON.parse(await run(['cargo', 'run', '--quiet', '--', 'compare', ...files, '--json'], { env }));
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+}

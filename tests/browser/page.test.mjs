@@ -85,6 +85,16 @@ for (const fault of [false, true]) {
     ));
 }
 
+test('another scene is chosen while the first one loads', () =>
+  withPage('?scene=hall:1000000&technique=normals&size=24x16', async (page) => {
+    await page.waitForFunction(() => document.querySelectorAll('#scene option').length > 3, { polling: 20 });
+    await page.select('#scene', 'furnace');
+    await waitForFrames(page, 1);
+    await page.waitForFunction(() => location.search.includes('scene=furnace'), { polling: 50 });
+    assert.ok(await page.$eval('#loading', (bar) => bar.hidden));
+    assert.ok(await page.$eval('#message', (message) => message.hidden), 'nothing went wrong');
+  }));
+
 test('follows the window', () =>
   withPage('?scene=cornell&technique=normals&scale=0.25', async (page) => {
     await waitForFrames(page, 1);

@@ -1,8 +1,8 @@
 // What the page offers beside the picture: presets, search, keys, passes, saving and copying.
 import { strict as assert } from 'node:assert';
 import { after, before, test } from 'node:test';
-import { renderNatively } from './native.mjs';
-import { assertNoProblems, openPage, openSite, readDisplay, waitForFrames } from './pages.mjs';
+import { compareNatively, renderNatively } from './native.mjs';
+import { assertNoProblems, openPage, openSite, readDisplay, waitForFrames, waitForMessage } from './pages.mjs';
 
 let site;
 before(async () => (site = await openSite()));
@@ -50,6 +50,21 @@ test('a preset sets technique and parameters, and is left when one of them chang
     assert.ok(close / picture.length > 0.99, `${close} of ${picture.length} values are those of the command line's preset`);
     await page.select('#parameter-reuse_weights', 'balance');
     await page.waitForFunction(() => document.getElementById('preset').value === '', { polling: 50 });
+  }));
+
+test('a setting that contradicts another is refused in words, and shown as it was', () =>
+  withPage('?scene=cornell&size=24x16&frames=1&technique=restir-di-decoupled&reuse_weights=heuristics', async (page) => {
+    await page.select('#parameter-visibility', 'mis');
+    assert.match(await waitForMessage(page), /mis.*heuristics|heuristics.*mis/s);
+    assert.equal(await value(page, '#parameter-visibility'), 'decoupled');
+    assert.ok(!(await page.evaluate(() => location.search)).includes('visibility'));
+  }));
+
+test('a link may say yes for true', () =>
+  withPage(`${small}&spatial_feedback=yes&temporal_reuse=on`, async (page) => {
+    assert.ok(await page.$eval('#parameter-spatial_feedback', (box) => box.checked));
+    await addressHas(page, 'spatial_feedback=true');
+    assert.ok(!(await page.evaluate(() => location.search)).includes('temporal_reuse'), 'that is the default');
   }));
 
 test('settings are searched by name and by what they do', () =>
@@ -133,4 +148,46 @@ test('the picture is saved, a link copied that shows it, and a command line that
     const native = await renderNatively('builtin:cornell', ['--technique', 'normals', '--set', 'render.pixel_filter=center', '--size', '24x16', '--frames', '2', '--seed', '5', '--pose', pose]);
     const close = moved.filter((byte, at) => Math.abs(byte - native.rgb[at]) <= 2).length;
     assert.ok(close / moved.length > 0.97, `${close} of ${moved.length} values are those of ${posed}`);
+  }));
+
+test('errors against a reference are those of the command line, are drawn, and end when the camera moves', () =>
+  withPage('?scene=cornell&technique=path-tracer&size=24x16&frames=64&render.max_depth=1', async (page) => {
+    const told = () => page.$eval('#errors-table', (table) => table.innerText);
+    await waitForFrames(page, 64);
+    await page.click('#errors summary');
+    await page.click('#keep-reference');
+    // The same frames again end at the picture itself.
+    await page.waitForFunction(() => document.getElementById('errors-table').innerText.includes('0.00e+0'), { polling: 50 });
+    await page.select('#technique', 'ris');
+    await addressHas(page, 'technique=ris');
+    await waitForFrames(page, 64);
+    await page.evaluate(() => {
+      HTMLAnchorElement.prototype.click = function () {
+        window.saved = fetch(this.href).then((file) => file.text());
+      };
+    });
+    const lastOf = (csv) => csv.trim().split('\n').at(-1).split(',');
+    await page.waitForFunction(
+      async () => {
+        document.getElementById('errors-csv').click();
+        return (await window.saved).trim().split('\n').at(-1).split(',')[1] === '64';
+      },
+      { polling: 200 },
+    );
+    const csv = await page.evaluate(() => window.saved);
+    const [name, , , mse] = lastOf(csv);
+    assert.equal(name, '"ris render.max_depth=1"');
+    assert.match(csv, /^series,frames,milliseconds,mse,relmse,mape,bias\n"path-tracer/);
+    const common = ['--size', '24x16', '--frames', '64', '--set', 'render.max_depth=1'];
+    const native = await compareNatively('builtin:cornell', [...common, '--technique', 'ris'], [...common, '--technique', 'path-tracer']);
+    assert.ok(Math.abs(Number(mse) / native.mse - 1) < 0.05, `${mse} here, ${native.mse} there`);
+    assert.match(await told(), /MSE\s+\d\.\d\de-\d/);
+    assert.equal(await page.$$eval('#errors-plot polyline', (lines) => lines.length), 2);
+
+    await page.mouse.move(100, 100);
+    await page.mouse.down();
+    await page.mouse.move(140, 110, { steps: 2 });
+    await page.mouse.up();
+    await page.waitForFunction(() => document.getElementById('errors-words').innerText.includes('camera'), { polling: 50 });
+    assert.equal(await told(), '');
   }));

@@ -1,0 +1,177 @@
+// How far the picture is from a reference that the user kept: figures, curves against frames or time, and CSV.
+import type { Errors } from './api.js';
+import { byId } from './notices.js';
+import type { RestirViewer, Sample } from './viewer.js';
+
+/** One measurement. */
+interface Reading extends Errors {
+  /** Frames in the picture. */
+  frames: number;
+  /** All that these took. */
+  milliseconds: number;
+}
+
+/** Measurements since a picture began. */
+interface Curve {
+  name: string;
+  readings: Reading[];
+}
+
+/** So many curves are kept: the picture's own, and those before it. */
+const mostCurves = 4;
+/** Milliseconds between two measurements, which read the picture back. */
+const interval = 300;
+const [width, height, margin] = [320, 180, 34];
+
+const percent = (value: number | null, signed = false) =>
+  value === null ? '–' : `${signed && value > 0 ? '+' : ''}${(100 * value).toPrecision(3)} %`;
+
+function svg(tag: string, attributes: Record<string, string | number>, text?: string): SVGElement {
+  const element = document.createElementNS('http://www.w3.org/2000/svg', tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
+  if (text !== undefined) element.textContent = text;
+  return element;
+}
+
+/** Powers of ten that hold all `values`, which are above 0. */
+function decades(values: number[]): [number, number] {
+  const low = Math.floor(Math.log10(Math.min(...values)));
+  return [low, Math.max(Math.ceil(Math.log10(Math.max(...values))), low + 1)];
+}
+
+export class ErrorMeter {
+  private curves: Curve[] = [];
+  private kept = false;
+  private measuring = false;
+  private last = 0;
+  /** Of the picture that is being made. */
+  private milliseconds = 0;
+  private frames = 0;
+
+  constructor(private readonly view: RestirViewer) {
+    byId('keep-reference', HTMLButtonElement).addEventListener('click', () => void this.keep());
+    byId('errors-csv', HTMLButtonElement).addEventListener('click', () => this.save());
+    byId('errors-axis', HTMLSelectElement).addEventListener('change', () => this.show());
+    view.addEventListener('sample', ({ detail }) => void this.observe(detail));
+    // From elsewhere, or of something else, the same light looks otherwise.
+    for (const event of ['camera-change', 'load'] as const) view.addEventListener(event, () => this.forget());
+    this.show();
+  }
+
+  private async keep(): Promise<void> {
+    await this.view.keepReference().catch(() => undefined);
+    this.kept = true;
+    this.curves = [];
+    this.frames = 0;
+    await this.view.reset().catch(() => undefined);
+    this.show();
+  }
+
+  private forget(): void {
+    if (!this.kept) return;
+    this.kept = false;
+    this.show('The camera or the scene has changed: keep a new reference.');
+  }
+
+  private async observe({ count, milliseconds, complete }: Sample): Promise<void> {
+    if (!this.kept) return;
+    const begins = count <= this.frames || this.curves.length === 0;
+    this.milliseconds = count <= this.frames ? milliseconds : this.milliseconds + milliseconds;
+    this.frames = count;
+    if (begins && this.view.accumulating) this.begin();
+    const now = performance.now();
+    if (this.measuring || !(begins || complete || now - this.last > interval)) return;
+    this.measuring = true;
+    this.last = now;
+    const reading = { frames: count, milliseconds: this.milliseconds };
+    const curve = this.curves.at(-1) ?? this.begin();
+    try {
+      // Between two frames: of the picture that this sample is of.
+      const errors = await this.view.errors();
+      if (!this.kept) return;
+      // Frames that are not averaged are each a picture of their own.
+      curve.readings = this.view.accumulating ? [...curve.readings, { ...reading, ...errors }] : [{ ...reading, ...errors }];
+      this.show();
+    } catch (error) {
+      this.kept = false;
+      this.show((error as Error).message);
+    } finally {
+      this.measuring = false;
+    }
+  }
+
+  private begin(): Curve {
+    const { technique, values } = this.view.settings;
+    const own = [...values].filter(([key]) => !key.startsWith('film.')).map(([key, value]) => `${key}=${value}`);
+    const curve: Curve = { name: [technique, ...own].join(' '), readings: [] };
+    // What was begun and not measured is nothing.
+    this.curves = [...this.curves.filter(({ readings }) => readings.length > 0), curve].slice(-mostCurves);
+    return curve;
+  }
+
+  private show(words = 'Let the path tracer average many frames, keep the picture, then choose what to compare with it.'): void {
+    const readings = this.curves.at(-1)?.readings ?? [];
+    const now = readings.at(-1);
+    const cells = now && this.kept
+      ? [['MSE', now.mse.toExponential(2)], ['relative MSE', now.relmse.toExponential(2)], ['MAPE', percent(now.mape)], ['bias', percent(now.bias, true)]]
+      : [];
+    const rows = cells.map(([name = '', value = '']) => {
+      const row = document.createElement('tr');
+      row.append(Object.assign(document.createElement('th'), { scope: 'row', textContent: name }), Object.assign(document.createElement('td'), { textContent: value }));
+      return row;
+    });
+    byId('errors-table', HTMLTableElement).replaceChildren(...rows);
+    byId('errors-words', HTMLElement).textContent = this.kept ? '' : words;
+    byId('errors-csv', HTMLButtonElement).disabled = this.curves.every((curve) => curve.readings.length === 0);
+    this.plot();
+  }
+
+  /** MSE on two logarithmic axes. */
+  private plot(): void {
+    const byTime = byId('errors-axis', HTMLSelectElement).value === 'time';
+    const points = ({ readings }: Curve) =>
+      readings.map(({ frames, milliseconds, mse }): [number, number] => [byTime ? milliseconds : frames, mse]).filter(([x, y]) => x > 0 && y > 0);
+    const all = this.curves.flatMap(points);
+    const figure = byId('errors-plot', HTMLElement);
+    const drawn = this.curves.filter((curve) => points(curve).length > 0);
+    if (all.length === 0) return figure.replaceChildren();
+    const [x0, x1] = decades(all.map(([x]) => x));
+    const [y0, y1] = decades(all.map(([, y]) => y));
+    const atX = (x: number) => margin + ((Math.log10(x) - x0) / (x1 - x0)) * (width - margin - 8);
+    const atY = (y: number) => 6 + ((y1 - Math.log10(y)) / (y1 - y0)) * (height - margin);
+    const picture = svg('svg', { viewBox: `0 0 ${width} ${height}`, role: 'img', 'aria-label': `MSE against ${byTime ? 'time' : 'frames'}` });
+    for (let power = x0; power <= x1; power++) {
+      const x = atX(10 ** power);
+      picture.append(svg('line', { x1: x, x2: x, y1: atY(10 ** y1), y2: atY(10 ** y0), class: 'grid' }), svg('text', { x, y: height - 14, 'text-anchor': 'middle' }, `1e${power}`));
+    }
+    for (let power = y0; power <= y1; power++) {
+      const y = atY(10 ** power);
+      picture.append(svg('line', { x1: margin, x2: width - 8, y1: y, y2: y, class: 'grid' }), svg('text', { x: margin - 4, y: y + 3, 'text-anchor': 'end' }, `1e${power}`));
+    }
+    picture.append(svg('text', { x: width / 2, y: height - 2, 'text-anchor': 'middle' }, byTime ? 'milliseconds' : 'frames'));
+    for (const [index, curve] of drawn.entries()) {
+      const line = points(curve).map(([x, y]) => `${atX(x).toFixed(1)},${atY(y).toFixed(1)}`).join(' ');
+      picture.append(svg('polyline', { points: line, class: `curve curve-${index}` }));
+      const [x, y] = points(curve).at(-1) ?? [1, 1];
+      picture.append(svg('circle', { cx: atX(x), cy: atY(y), r: 2.5, class: `curve-${index}` }));
+    }
+    const legend = document.createElement('ul');
+    for (const [index, { name }] of drawn.entries()) {
+      const item = document.createElement('li');
+      item.append(Object.assign(document.createElement('i'), { className: `curve-${index}` }), name);
+      legend.append(item);
+    }
+    figure.replaceChildren(picture, legend);
+  }
+
+  private save(): void {
+    const quoted = (text: string) => `"${text.replaceAll('"', '""')}"`;
+    const lines = this.curves.flatMap(({ name, readings }) =>
+      readings.map(({ frames, milliseconds, mse, relmse, mape, bias }) => [quoted(name), frames, milliseconds.toFixed(3), mse, relmse, mape ?? '', bias ?? ''].join(',')),
+    );
+    const csv = ['series,frames,milliseconds,mse,relmse,mape,bias', ...lines, ''].join('\n');
+    const href = URL.createObjectURL(new Blob([csv], { type: 'text/csv' }));
+    Object.assign(document.createElement('a'), { href, download: 'errors.csv' }).click();
+    setTimeout(() => URL.revokeObjectURL(href), 60_000);
+  }
+}
