@@ -3,9 +3,9 @@
 use super::{JsResult, Lighting, OrJs, flatten, js_error, surround_by_name};
 use crate::film::blit::Blit;
 use crate::gpu::{Gpu, GpuOptions, instance};
+use crate::lab::metrics;
 use crate::pace::Pace;
 use crate::scene::{Camera, Projection, builtin};
-use crate::lab::metrics;
 use crate::{Error, FlatScene, Image, Renderer};
 use glam::{UVec2, Vec3};
 use std::cell::RefCell;
