@@ -3,6 +3,7 @@ import type { Description, SceneReport, Stats, TechniqueInfo } from './api.js';
 import { acceptDrops } from './files.js';
 import { byId, clearError, showError, showProgress, showStatus, showWarnings } from './notices.js';
 import { commandLine } from './command.js';
+import { Compare } from './compare.js';
 import { ErrorMeter } from './error-meter.js';
 import { type Group, fillMenu, filterPanel, showPanel } from './panel.js';
 import type { Contents, SceneSource } from './protocol.js';
@@ -31,9 +32,21 @@ const scales: [string, string][] = [
 const menu = (id: string) => byId(id, HTMLSelectElement);
 const button = (id: string) => byId(id, HTMLButtonElement);
 
+const without = (query: URLSearchParams, key: string) => {
+  const rest = new URLSearchParams(query);
+  rest.delete(key);
+  return rest.toString();
+};
+
 class App {
-  private readonly query = readQuery(location.search);
+  private readonly address = new URLSearchParams(location.search);
+  /** The settings of the second picture, where the address has one. */
+  private readonly secondQuery = this.address.get('b');
+  private readonly query = readQuery(without(this.address, 'b'));
   readonly view = new RestirViewer(byId('canvas', HTMLCanvasElement), this.query.state);
+  readonly compare = new Compare(this.view, () => this.showCompare());
+  /** Whose settings the panel shows. */
+  private edited = this.view;
   private readonly time = new TimeControls({
     play: (on) => this.setAccumulate(!on),
     seek: (seconds) => this.view.setTime(seconds).catch(() => undefined),
@@ -67,6 +80,7 @@ class App {
     }
     try {
       await opening;
+      if (this.secondQuery !== null) await this.compare.open(this.secondQuery);
     } catch (problem) {
       // The user has chosen something else meanwhile.
       if (view.loading) return;
@@ -148,7 +162,7 @@ class App {
   // Settings
 
   private technique(): TechniqueInfo | undefined {
-    return this.description?.techniques.find(({ id }) => id === this.view.settings.technique);
+    return this.description?.techniques.find(({ id }) => id === this.edited.settings.technique);
   }
 
   private groups(): Group[] {
@@ -173,12 +187,12 @@ class App {
       this.showAccumulate(this.view.accumulating);
     };
     // What was refused is shown as it was.
-    void this.view.setParam(key, value).then(changed, () => this.showMenus());
+    void this.edited.setParam(key, value).then(changed, () => this.showMenus());
   }
 
   private showPresets(): void {
     const presets = this.description?.presets ?? [];
-    const chosen = presets.find(({ id }) => id === this.view.preset);
+    const chosen = presets.find(({ id }) => id === this.edited.preset);
     fillMenu(menu('preset'), [['', 'none'], ...presets.map(({ id, title }): [string, string] => [id, title])], chosen?.id ?? '');
     menu('preset').title = chosen?.doc ?? '';
   }
@@ -186,9 +200,9 @@ class App {
   // Menus and events
 
   private showMenus(): void {
-    const { settings } = this.view;
+    const { settings } = this.edited;
     const technique = this.technique();
-    fillMenu(menu('scene'), this.scenes(), settings.scene ?? menu('scene').value);
+    fillMenu(menu('scene'), this.scenes(), this.view.settings.scene ?? menu('scene').value);
     fillMenu(menu('technique'), (this.description?.techniques ?? []).map(({ id, title }) => [id, title]), settings.technique);
     this.showPresets();
     fillMenu(menu('view'), (technique?.views ?? []).map((name) => [name, name]), settings.view);
@@ -228,15 +242,17 @@ class App {
     menu('variant').addEventListener('change', () => void this.settle(view.choose({ variant: menu('variant').value || undefined })));
     menu('scene').addEventListener('change', () => void this.settle(view.load(menu('scene').value)));
     menu('environment').addEventListener('change', () => void this.settle(view.setEnvironment(menu('environment').value || null)));
-    menu('technique').addEventListener('change', () => void this.settled(view.setTechnique(menu('technique').value)));
+    menu('technique').addEventListener('change', () => void this.settled(this.edited.setTechnique(menu('technique').value)));
     menu('preset').addEventListener('change', () => {
       const { value } = menu('preset');
       // None is no settings of its own: the technique's defaults.
-      void this.settled(value ? view.setPreset(value) : view.setTechnique(view.settings.technique));
+      void this.settled(value ? this.edited.setPreset(value) : this.edited.setTechnique(this.edited.settings.technique));
     });
     const search = byId('search', HTMLInputElement);
     search.addEventListener('input', () => filterPanel(byId('panel', HTMLElement), search.value));
-    menu('view').addEventListener('change', () => void view.setView(menu('view').value));
+    menu('view').addEventListener('change', () => void this.edited.setView(menu('view').value));
+    menu('target').addEventListener('change', () => this.edit(menu('target').value));
+    button('compare').addEventListener('click', () => (this.compare.other ? this.compare.close() : void this.openCompare()));
     menu('camera').addEventListener('change', () => void view.setCamera(Number(menu('camera').value)));
     menu('scale').addEventListener('change', () => void view.setScale(Number(menu('scale').value) || undefined));
     const accumulate = byId('accumulate', HTMLInputElement);
@@ -254,12 +270,14 @@ class App {
     button('pause').addEventListener('click', () => this.pause(!view.paused));
     button('step').addEventListener('click', () => {
       this.pause(true);
-      view.step();
+      for (const each of this.viewers()) each.step();
     });
-    button('reset').addEventListener('click', () => void view.reset());
+    button('reset').addEventListener('click', () => {
+      for (const each of this.viewers()) void each.reset();
+    });
     byId('timing', HTMLDetailsElement).addEventListener('toggle', () => this.stats && showTiming(this.stats));
     button('save').addEventListener('click', () => void this.save());
-    button('copy-link').addEventListener('click', () => void this.copy(button('copy-link'), view.shareUrl(location.href)));
+    button('copy-link').addEventListener('click', () => void this.copy(button('copy-link'), this.link()));
     button('copy-command').addEventListener('click', () => void this.copy(button('copy-command'), this.command()));
     const help = byId('help', HTMLDialogElement);
     button('keys').addEventListener('click', () => help.showModal());
@@ -270,16 +288,43 @@ class App {
   private shortcut(event: KeyboardEvent): void {
     const typing = event.target instanceof Element && event.target.closest('a, button, dialog, input, select, summary');
     if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
-    const buttons: Record<string, string> = { ' ': 'pause', '.': 'step', r: 'reset', h: 'fold', p: 'play', '?': 'keys' };
+    const buttons: Record<string, string> = { ' ': 'pause', '.': 'step', r: 'reset', c: 'compare', h: 'fold', p: 'play', '?': 'keys' };
+    if (event.key === 'x') return this.compare.flip();
     const id = buttons[event.key];
     if (!id) return;
     event.preventDefault();
     button(id).click();
   }
 
+  /** A second picture begins as a copy of the first; what is changed next is changed in it. */
+  private async openCompare(): Promise<void> {
+    await this.compare.open();
+    this.edit('b');
+  }
+
+  private edit(side: string): void {
+    this.edited = (side === 'b' && this.compare.other) || this.view;
+    menu('target').value = this.edited === this.view ? 'a' : 'b';
+    this.showMenus();
+  }
+
+  private showCompare(): void {
+    const { other } = this.compare;
+    byId('target-row', HTMLElement).hidden = !other;
+    button('compare').setAttribute('aria-pressed', String(other !== undefined));
+    if (!other && this.edited !== this.view) this.edit('a');
+    this.writeUrl();
+  }
+
+  private viewers(): RestirViewer[] {
+    return [this.view, ...(this.compare.other ? [this.compare.other] : [])];
+  }
+
   private pause(paused: boolean): void {
-    if (paused) this.view.pause();
-    else this.view.play();
+    for (const view of this.viewers()) {
+      if (paused) view.pause();
+      else view.play();
+    }
     button('pause').setAttribute('aria-pressed', String(paused));
   }
 
@@ -297,6 +342,13 @@ class App {
     const name = `${(this.view.scene?.source.name ?? 'restir').replace(/[^\w.-]+/g, '-')}-${this.view.settings.technique}.png`;
     Object.assign(document.createElement('a'), { href, download: name }).click();
     setTimeout(() => URL.revokeObjectURL(href), 60_000);
+  }
+
+  private link(): string {
+    const url = new URL(this.view.shareUrl(location.href));
+    const second = this.compare.query;
+    if (second !== undefined) url.search += `${url.search ? '&' : '?'}b=${encodeURIComponent(second)}`;
+    return url.href;
   }
 
   private command(): string {
@@ -320,7 +372,7 @@ class App {
   private writeUrl(): void {
     clearTimeout(this.urlTimer);
     this.urlTimer = window.setTimeout(() => {
-      history.replaceState(null, '', this.view.shareUrl(location.href));
+      history.replaceState(null, '', this.link());
     }, 300);
   }
 
@@ -354,9 +406,12 @@ const app = new App();
 declare global {
   interface Window {
     /** For the console and the tests: runs work on the viewer between two frames. */
-    restir?: { call: RestirViewer['call'] };
+    restir?: { call: RestirViewer['call']; other: RestirViewer['call'] };
   }
 }
-window.restir = { call: (work) => app.view.call(work) };
+window.restir = {
+  call: (work) => app.view.call(work),
+  other: (work) => app.compare.other?.call(work) ?? Promise.reject(new Error('there is no second picture')),
+};
 
 void app.start();

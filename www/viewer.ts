@@ -10,7 +10,7 @@ import { RestirError, toFailure } from './messages.js';
 import { Viewer } from './pkg/restir.js';
 import type { Choice, Contents, SceneSource, Surroundings } from './protocol.js';
 import { RenderLoop } from './render-loop.js';
-import { Resolution } from './resolution.js';
+import { Resolution, longestSide } from './resolution.js';
 import { type Settings, defaultSettings, writeQuery } from './url-state.js';
 import { compileWasm, startWasm } from './wasm.js';
 
@@ -84,6 +84,8 @@ export interface RestirViewer {
 
 /** What a scene opens with. What is left out is the scene's own; `environment` is kept as it is. */
 export interface LoadOptions {
+  /** Index or name among the scene's animations. */
+  animation?: string;
   /** `sky...`, `white`, or the address of an .hdr or .exr map; null for the scene's own. */
   environment?: string | null | undefined;
   /** Index or name among the scene's cameras. */
@@ -192,6 +194,18 @@ export class RestirViewer extends EventTarget {
       if (source.kind === 'builtin') return;
       const view = choice.scene === undefined ? this.wanted?.view : {};
       await this.open({ ...source, choice: { ...source.choice, ...choice } }, this.surroundingsFor(undefined), view);
+    });
+  }
+
+  /** Shows what another viewer shows, from the same bytes: its scene, from where it is seen, at its moment. */
+  showAs(other: RestirViewer): Promise<void> {
+    return this.reported(async () => {
+      const { shown, flat } = other;
+      if (!shown || !flat) throw invalid('There is no scene yet.');
+      const { camera, pose, animation, time } = other.settings;
+      await this.start();
+      await this.present(flat, shown, { camera, time: other.accumulating ? time : other.moment, animation, ...(pose && { pose }) });
+      if (this.shown) this.emit('load', this.shown);
     });
   }
 
@@ -348,6 +362,15 @@ export class RestirViewer extends EventTarget {
     });
   }
 
+  /** Renders so many pixels wide and high, 1 to 8192 each; undefined follows the canvas. */
+  setSize(size: [number, number] | undefined): Promise<void> {
+    return this.reported(async () => {
+      for (const side of size ?? []) checkRange('size', side, 1, longestSide, true);
+      this.settings.size = this.resolution.fixedSize = size;
+      this.emit('param-change', { name: 'size', value: size?.join('x') });
+    });
+  }
+
   /** Stops after so many averaged frames, until something changes; undefined goes on. */
   setMaxSamples(frames: number | undefined): Promise<void> {
     return this.reported(async () => {
@@ -458,8 +481,7 @@ export class RestirViewer extends EventTarget {
   keepReference(): Promise<void> {
     return this.reported(async () => {
       await this.call((viewer) => viewer.keep_reference());
-      this.settings.size = this.resolution.fixedSize = [...this.rendered];
-      this.emit('param-change', { name: 'size', value: this.rendered.join('x') });
+      await this.setSize([...this.rendered]);
     });
   }
 
@@ -572,8 +594,13 @@ export class RestirViewer extends EventTarget {
     await this.start();
     const { flat, contents = noContents } = await loading;
     progress(1, 'Starting the renderer');
+    await this.present(flat, { source, surroundings, contents }, view);
+  }
+
+  private async present(flat: Uint8Array, given: Pick<Scene, 'source' | 'surroundings' | 'contents'>, view: View | undefined): Promise<void> {
+    const { source, surroundings } = given;
     const take = (viewer: Viewer): void => {
-      this.shown = { source, surroundings, contents, cameras: camerasOf(viewer), report: reportOf(viewer) };
+      this.shown = { ...given, cameras: camerasOf(viewer), report: reportOf(viewer) };
       this.flat = flat;
       this.settings.environment = surroundings?.bytes ? undefined : surroundings?.name;
       this.settings.scene = { builtin: source.name, address: source.kind === 'address' ? source.address : '', file: undefined }[source.kind];

@@ -2,6 +2,7 @@
 import { strict as assert } from 'node:assert';
 import { after, before, test } from 'node:test';
 import { compareNatively, renderNatively } from './native.mjs';
+import { decodePng } from './png.mjs';
 import { assertNoProblems, openPage, openSite, readDisplay, waitForFrames, waitForMessage } from './pages.mjs';
 
 let site;
@@ -25,6 +26,8 @@ async function withPage(query, work) {
 
 const small = '?scene=cornell&size=24x16&frames=2';
 const value = (page, selector) => page.$eval(selector, (element) => element.value);
+/** Three bytes a pixel to four. */
+const withAlpha = (rgb) => Uint8Array.from({ length: (rgb.length / 3) * 4 }, (_, at) => (at % 4 === 3 ? 255 : rgb[Math.floor(at / 4) * 3 + (at % 4)]));
 const addressHas = (page, text) => page.waitForFunction((wanted) => location.search.includes(wanted), { polling: 50 }, text);
 
 test('a preset sets technique and parameters, and is left when one of them changes', () =>
@@ -190,4 +193,72 @@ test('errors against a reference are those of the command line, are drawn, and e
     await page.mouse.up();
     await page.waitForFunction(() => document.getElementById('errors-words').innerText.includes('camera'), { polling: 50 });
     assert.equal(await told(), '');
+  }));
+
+test('two pictures side by side: their own settings, one camera, a divider, and a link that holds both', () =>
+  withPage('?scene=cornell&technique=normals&size=24x16&frames=2&render.pixel_filter=center', async (page) => {
+    const second = (tab) =>
+      tab.evaluate(async () => btoa(String.fromCharCode(...(await window.restir.other((viewer) => viewer.read_display())))));
+    const untilSecond = (tab, text) => tab.waitForFunction((wanted) => document.getElementById('label-b').textContent.includes(wanted), { polling: 50 }, text);
+    const alone = await readDisplay(page);
+    await page.click('#compare');
+    await untilSecond(page, '2 frames');
+    assert.equal(await value(page, '#target'), 'b');
+    assert.equal(await second(page), Buffer.from(withAlpha(alone)).toString('base64'), 'it begins as the same picture');
+
+    // The panel changes B alone.
+    await page.select('#technique', 'ris');
+    await addressHas(page, 'b=');
+    await untilSecond(page, 'ris, 2 frames');
+    assert.deepEqual(await readDisplay(page), alone);
+    const other = await second(page);
+    assert.notEqual(other, Buffer.from(withAlpha(alone)).toString('base64'));
+    await page.select('#target', 'a');
+    assert.equal(await value(page, '#technique'), 'normals');
+
+    // What is seen: A left of the divider, B right of it.
+    const row = async () => {
+      const { rgb } = decodePng(Buffer.from(await page.screenshot({ clip: { x: 0, y: 300, width: 400, height: 1 } })));
+      return (x) => [...rgb.subarray(3 * x, 3 * x + 3)].join();
+    };
+    const places = [150, 390];
+    const shownAt = async () => places.map(await row());
+    await page.focus('#divider');
+    await page.keyboard.press('End');
+    const onlyA = await shownAt();
+    await page.keyboard.press('Home');
+    const onlyB = await shownAt();
+    assert.notEqual(onlyA[0], onlyB[0]);
+    assert.notEqual(onlyA[1], onlyB[1]);
+    await page.mouse.move(2, 200);
+    await page.mouse.down();
+    await page.mouse.move(270, 200, { steps: 3 });
+    await page.mouse.up();
+    assert.deepEqual(await shownAt(), [onlyA[0], onlyB[1]]);
+    assert.equal(await page.$eval('#divider', (divider) => divider.ariaValueNow), '42');
+
+    // One camera for both.
+    await page.mouse.move(100, 250);
+    await page.mouse.down();
+    await page.mouse.move(140, 260, { steps: 2 });
+    await page.mouse.up();
+    await addressHas(page, 'pose=');
+    await waitForFrames(page, 2);
+    await untilSecond(page, '2 frames');
+    const cameras = await page.evaluate(async () => [
+      await window.restir.call((viewer) => viewer.camera()),
+      await window.restir.other((viewer) => viewer.camera()),
+    ]);
+    assert.equal(cameras[0], cameras[1]);
+
+    const link = await page.evaluate(() => location.search);
+    const copy = await openPage(site, link);
+    await untilSecond(copy.page, 'ris, 2 frames');
+    assert.deepEqual(await copy.page.evaluate(() => window.restir.call((viewer) => viewer.camera())).then((text) => JSON.parse(text).name), JSON.parse(cameras[0]).name);
+    assertNoProblems(copy.problems);
+    await copy.page.close();
+
+    await page.click('#compare');
+    await page.waitForFunction(() => !location.search.includes('b='), { polling: 50 });
+    assert.equal(await page.$('#canvas-b'), null);
   }));
