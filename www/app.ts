@@ -64,13 +64,14 @@ class App {
 
   async start(): Promise<void> {
     const { view } = this;
-    const { scene = defaultScene, environment } = this.query.state;
+    const { scene = defaultScene, environment, sceneIndex, variant } = this.query.state;
+    const choice = { ...(sceneIndex !== undefined && { scene: sceneIndex }), ...(variant !== undefined && { variant }) };
     view.controls = 'orbit';
     // On a small screen the picture comes first.
     if (matchMedia('(max-width: 30rem)').matches) this.fold();
     this.follow();
     new ErrorMeter(view);
-    const opening = view.load(scene, { environment });
+    const opening = view.load(scene, { environment, choice });
     try {
       this.description = await RestirViewer.describe();
       this.listen();
@@ -85,7 +86,7 @@ class App {
       // The user has chosen something else meanwhile.
       if (view.loading) return;
       // Without what could not be had: first the environment, then the scene, and with that how it was to be seen.
-      if (environment !== undefined && !view.scene) await this.settle(view.load(scene, { environment: null }));
+      if (environment !== undefined && !view.scene) await this.settle(view.load(scene, { environment: null, choice }));
       if (!view.scene) {
         Object.assign(view.settings, { camera: '0', pose: undefined, time: 0, animation: '0' });
         await this.settle(view.load(defaultScene, { environment: null }));

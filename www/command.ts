@@ -12,6 +12,8 @@ export function commandLine(settings: Settings, sceneName: string, time: number,
   const { scene, environment, technique, seed, accumulate, lights, animation, camera, pose, values } = settings;
   const words = ['restir', 'render', scene === undefined || /[./]/.test(scene) ? fileName(scene ?? sceneName) : `builtin:${scene}`];
   const put = (name: string, value: string | number | undefined) => value !== undefined && words.push(`--${name}`, String(value));
+  put('scene-index', settings.sceneIndex);
+  put('variant', settings.variant);
   put('technique', technique);
   for (const [key, value] of values) put('set', `${key}=${value}`);
   put('size', size.join('x'));

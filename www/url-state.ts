@@ -9,6 +9,9 @@ export const defaultTechnique = 'restir-di';
 export interface Settings {
   /** A built-in scene's name, or a file's address; undefined for a file of the user's. */
   scene: string | undefined;
+  /** Of a glTF file: index of the scene shown instead of the default one, and name of the variant. */
+  sceneIndex: number | undefined;
+  variant: string | undefined;
   /** What surrounds the scene: `sky...`, `white`, or the address of a map; undefined for its own, or a file of the user's. */
   environment: string | undefined;
   technique: string;
@@ -40,6 +43,8 @@ export interface Settings {
 
 export const defaultSettings = (): Settings => ({
   scene: 'cornell',
+  sceneIndex: undefined,
+  variant: undefined,
   environment: undefined,
   technique: defaultTechnique,
   view: 'radiance',
@@ -100,6 +105,8 @@ export const poseText = ({ position, forward, up }: Pose) =>
 
 const readers: Record<string, (state: Settings, text: string) => void> = {
   scene: (state, text) => (state.scene = text),
+  'scene-index': (state, text) => (state.sceneIndex = integer(text, 0, 0xffffffff)),
+  variant: (state, text) => (state.variant = text),
   environment: (state, text) => (state.environment = text),
   technique: (state, text) => (state.technique = text),
   view: (state, text) => (state.view = text),
@@ -140,6 +147,8 @@ export function writeQuery(state: Settings): string {
     if (value !== undefined && value !== standard) query.set(key, String(value));
   };
   put('scene', state.scene, defaults.scene);
+  put('scene-index', state.sceneIndex, undefined);
+  put('variant', state.variant, undefined);
   put('environment', state.environment, defaults.environment);
   put('technique', state.technique, defaults.technique);
   put('view', state.view, defaults.view);

@@ -84,6 +84,8 @@ export interface RestirViewer {
 
 /** What a scene opens with. What is left out is the scene's own; `environment` is kept as it is. */
 export interface LoadOptions {
+  /** What of a glTF file to show. */
+  choice?: Choice;
   /** Index or name among the scene's animations. */
   animation?: string;
   /** `sky...`, `white`, or the address of an .hdr or .exr map; null for the scene's own. */
@@ -96,7 +98,7 @@ export interface LoadOptions {
 }
 
 /** How a scene is seen when it opens. */
-type View = Omit<LoadOptions, 'environment'>;
+type View = Omit<LoadOptions, 'environment' | 'choice'>;
 
 const noContents: Contents = { scenes: [], scene: 0, variants: [] };
 /** So many losses within so many milliseconds, and the viewer gives up. */
@@ -166,11 +168,13 @@ export class RestirViewer extends EventTarget {
    * Shows a scene: `builtin:cornell`, `cornell`, or the address of a .glb, .gltf, .obj or .restir file. A load still running is
    * abandoned: it rejects with `CANCELLED`. Rejects with `IO`, `BAD_FILE`, `UNSUPPORTED`, `UNKNOWN_NAME`, `LIMIT`, `NO_WEBGPU`, ...
    */
-  load(scene: string, { environment, ...view }: LoadOptions = {}): Promise<void> {
+  load(scene: string, { environment, choice, ...view }: LoadOptions = {}): Promise<void> {
     const given = Object.fromEntries(Object.entries(view).filter(([, value]) => value !== undefined)) as View;
     return this.reported(async () => {
       if (given.time !== undefined) checkRange('time', given.time, -1e9, 1e9);
-      await this.open(sourceOf(scene), this.surroundingsFor(environment), given);
+      const source = sourceOf(scene);
+      if (choice && source.kind !== 'builtin') source.choice = choice;
+      await this.open(source, this.surroundingsFor(environment), given);
     });
   }
 
@@ -602,6 +606,8 @@ export class RestirViewer extends EventTarget {
     const take = (viewer: Viewer): void => {
       this.shown = { ...given, cameras: camerasOf(viewer), report: reportOf(viewer) };
       this.flat = flat;
+      const { scene: sceneIndex, variant } = source.kind === 'builtin' ? {} : source.choice;
+      Object.assign(this.settings, { sceneIndex, variant });
       this.settings.environment = surroundings?.bytes ? undefined : surroundings?.name;
       this.settings.scene = { builtin: source.name, address: source.kind === 'address' ? source.address : '', file: undefined }[source.kind];
     };

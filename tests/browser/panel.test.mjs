@@ -262,3 +262,20 @@ test('two pictures side by side: their own settings, one camera, a divider, and 
     await page.waitForFunction(() => !location.search.includes('b='), { polling: 50 });
     assert.equal(await page.$('#canvas-b'), null);
   }));
+
+test('links and commands say all that determines a picture', async () => {
+  const { readQuery, writeQuery } = await import(new URL('../../dist/url-state.js', import.meta.url));
+  const { commandLine } = await import(new URL('../../dist/command.js', import.meta.url));
+  const query =
+    '?scene=https://example.org/a/car.glb&scene-index=1&variant=midnight+blue&environment=sky:elevation=6&technique=ris&view=normal&seed=7' +
+    '&accumulate=no&lights=5&time=1.5&speed=2&animation=walk&camera=2&pose=0,1,2,0,0,-1,0,1,0&size=64x48&scale=0.5&frames=9&candidates=3';
+  const { state, warnings } = readQuery(query);
+  assert.deepEqual(warnings, []);
+  assert.equal(writeQuery(state), query);
+  assert.equal(
+    commandLine(state, 'car.glb', 2.25, [64, 48], 9),
+    "restir render car.glb --scene-index 1 --variant 'midnight blue' --technique ris --set candidates=3 --size 64x48 --frames 9 --seed 7 " +
+      '--environment sky:elevation=6 --lights 5 --time 2.25 --animation walk --pose 0,1,2,0,0,-1,0,1,0 --accumulate no --out picture.png',
+  );
+  assert.deepEqual(readQuery('?scene-index=x&size=9000x9').warnings.length, 2);
+});
