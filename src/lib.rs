@@ -10,6 +10,7 @@ pub mod film;
 pub mod frame;
 pub mod gpu;
 pub mod gpu_scene;
+pub mod inspect;
 pub mod lab;
 pub mod output;
 pub mod pace;
@@ -44,6 +45,10 @@ pub fn gpu_layouts() -> Vec<scene::gpu_types::Layout> {
         frame::Frame::LAYOUT,
         film::FilmUniforms::LAYOUT,
         film::Counters::LAYOUT,
+        inspect::Inspected::LAYOUT,
+        inspect::Observation::LAYOUT,
+        inspect::TraceHead::LAYOUT,
+        inspect::Trace::LAYOUT,
     ];
     shared.into_iter().chain(techniques::ALL.iter().flat_map(|info| info.layouts.iter().copied())).collect()
 }

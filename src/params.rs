@@ -211,6 +211,9 @@ macro_rules! params {
     };
 }
 
+/// Of `max_depth`: what is longer than that nobody sees.
+const MOST_DEPTH: u32 = 1024;
+
 params! {
     /// Parameters of every technique that traces paths.
     pub struct RenderParams {
@@ -242,6 +245,23 @@ params! {
 }
 
 impl RenderParams {
+    /// Which settings, as they are now, bias the picture of every technique. Materials' options are no bias: they say what the truth is.
+    pub fn biases(&self) -> Vec<crate::techniques::Bias> {
+        crate::techniques::biases_that_hold(&[
+            (
+                self.max_depth < MOST_DEPTH,
+                "render.max_depth",
+                "longer paths are left out: darker, the less the more events there are",
+            ),
+            (self.pixel_filter == 1, "render.pixel_filter", "edges are not smoothed"),
+            (
+                self.texture_levels == 0,
+                "render.texture_levels",
+                "textures are blurred by up to about a pixel more than the pixel's filter",
+            ),
+        ])
+    }
+
     /// Puts in what changes the code of kernels.
     pub fn specialise(&self, features: &mut crate::gpu::shader::SceneFeatures) {
         features.energy_compensation = self.energy_compensation != 0;

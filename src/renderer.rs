@@ -4,16 +4,18 @@ use crate::error::{Error, Result};
 use crate::film::{Counters, Film};
 use crate::frame::{Frame, camera_view};
 use crate::gpu::Gpu;
+use crate::gpu::dissection::{Dissection, Easel};
 use crate::gpu::recorder::{PassTime, Recorder, Timer};
 use crate::gpu::shader::table;
 use crate::gpu_scene::{GpuScene, environment_light, sun_light};
+use crate::inspect::{Inspection, Inspector};
 use crate::output::Image;
 use crate::pace::Pace;
 use crate::params::{FilmParams, Params, RenderParams};
 use crate::scene::flat::environment;
 use crate::scene::stage::Stage;
 use crate::scene::{Camera, Environment, FlatScene};
-use crate::techniques::{self, Technique};
+use crate::techniques::{self, Bias, Technique};
 use glam::{UVec2, Vec2};
 
 /// Debug views that every technique has; the first is the picture itself.
@@ -107,6 +109,7 @@ pub struct Renderer {
     previous_time: f64,
     accumulated: u32,
     restart_film: bool,
+    inspector: Option<Inspector>,
     /// One line for each shader whose last edit did not compile (debug builds).
     pub shader_problems: Vec<String>,
 }
@@ -163,6 +166,7 @@ impl Renderer {
             previous_time: 0.0,
             accumulated: 0,
             restart_film: true,
+            inspector: None,
             shader_problems: Vec::new(),
             scene,
             gpu,
@@ -308,6 +312,11 @@ impl Renderer {
             "render": self.render_params.values(),
             "film": self.film_params.values(),
         })
+    }
+
+    /// Which settings, as they are now, bias the picture.
+    pub fn biases(&self) -> Vec<Bias> {
+        [self.technique.biases(), self.render_params.biases()].concat()
     }
 
     /// Shows a debug view, or `radiance`.
@@ -477,6 +486,51 @@ impl Renderer {
     /// # Errors
     /// `LIMIT` if the technique's buffers do not fit; `DEVICE` for an error the device has reported.
     pub fn render_frame(&mut self) -> Result<()> {
+        self.render(None)
+    }
+
+    /// Renders one frame as [`Renderer::render_frame`] does, its display included, and keeps what each pass has written.
+    ///
+    /// # Errors
+    /// As [`Renderer::render_frame`]; `LIMIT` also if the pictures do not fit.
+    pub fn dissect_frame(&mut self) -> Result<Dissection> {
+        let mut dissection = Dissection::new(self.size(), self.film.exposure_state().clone());
+        let easel = Easel::new(&self.gpu, self.size())?;
+        self.render(Some((&mut dissection, &easel)))?;
+        Ok(dissection)
+    }
+
+    /// Has the passes of frames from now on observed at a pixel, from the top left; `None` ends it.
+    ///
+    /// # Errors
+    /// `BAD_VALUE` for a pixel outside the picture, `LIMIT` if the device has no room.
+    pub fn inspect(&mut self, pixel: Option<UVec2>) -> Result<()> {
+        if let Some(pixel) = pixel
+            && pixel.cmpge(self.size()).any()
+        {
+            let size = self.size();
+            return Err(Error::bad_value("pixel", format!("{},{} is outside {}x{}", pixel.x, pixel.y, size.x, size.y)));
+        }
+        self.inspector = pixel.map(|pixel| Inspector::new(&self.gpu, pixel)).transpose()?;
+        Ok(())
+    }
+
+    /// What was seen at the inspected pixel in the last frame.
+    ///
+    /// # Errors
+    /// `BAD_VALUE` where no pixel is inspected, `DEVICE` if it cannot be read back.
+    pub fn inspection(&self) -> impl Future<Output = Result<Inspection>> + use<> {
+        let kinds = || self.scene.lights.iter().map(|light| light.kind).collect();
+        let read = self.inspector.as_ref().map(|inspector| inspector.read(&self.gpu, kinds()));
+        async move {
+            match read {
+                Some(read) => read.await,
+                None => Err(Error::bad_value("pixel", "none is inspected")),
+            }
+        }
+    }
+
+    fn render(&mut self, dissection: Option<(&mut Dissection, &Easel)>) -> Result<()> {
         self.gpu.check()?;
         if let Some(problems) = self.gpu.reload_shaders() {
             self.shader_problems = problems;
@@ -497,16 +551,27 @@ impl Renderer {
             timer.clear();
         }
         let mut recorder = Recorder::new(&self.gpu, self.timer.as_mut());
+        let dissects = dissection.is_some();
+        if let Some((dissection, easel)) = dissection {
+            recorder.dissect(dissection, easel);
+        }
         // Rays are counted by the frame, what was left out since the film began.
         recorder.encoder.clear_buffer(&self.film.counters, 0, if restart { None } else { Some(4) });
         self.gpu_scene.share(&mut recorder);
         self.render_params.specialise(&mut recorder.features);
         self.film.share(&mut recorder);
         recorder.share("frame", &self.frame_uniform);
+        if let Some(inspector) = &self.inspector {
+            inspector.share(&mut recorder);
+        }
         self.gpu_scene.record(&mut recorder)?;
         recorder.share("visibility", &self.visibility[parity]);
         recorder.share("previous_visibility", &self.visibility[1 - parity]);
-        recorder.pass(&table::SCENE_VISIBILITY).bind("visibility_out", &self.visibility[parity]).dispatch_over(size)?;
+        let pass = recorder.pass(&table::SCENE_VISIBILITY).inspected_by(&table::SCENE_INSPECT);
+        pass.bind("visibility_out", &self.visibility[parity]).dispatch_over(size)?;
+        if let Some(pass) = recorder.illustration(&table::SCENE_SEEN) {
+            pass.dispatch_over(size)?;
+        }
         if self.view >= FIRST_COMMON_VIEW {
             record_auxiliary(&mut recorder, [&self.albedo_depth, &self.normal, &self.motion], size)?;
             recorder
@@ -519,6 +584,9 @@ impl Renderer {
             self.technique.record(&mut recorder, size)?;
         }
         self.film.record_accumulate(&mut recorder, restart)?;
+        if dissects {
+            self.film.record_display(&mut recorder, &self.film_params)?;
+        }
         recorder.submit();
 
         self.accumulated = if restart { 1 } else { self.accumulated + 1 };

@@ -1,7 +1,6 @@
 // Exposure and tone mapping.
 // One invocation: one pixel. Reads the accumulation. Writes sRGB-encoded RGBA8, red in the lowest byte.
-#include "film/film.wgsl"
-#include "lib/color.wgsl"
+#include "film/show.wgsl"
 
 @group(1) @binding(1) var<storage, read> accumulation: array<vec4f>;
 @group(1) @binding(2) var<storage, read> exposure_state: array<f32>;
@@ -14,10 +13,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let index = id.y * film.size.x + id.x;
     let pixel = accumulation[index];
-    var color = pixel.rgb / max(pixel.a, 1.0);
-    if film.raw == 0u {
-        let ev = film.exposure + select(0.0, exposure_state[0], film.automatic_exposure == 1u);
-        color = tone_map(film.tone_map, max(color * exp2(ev), vec3f(0.0)));
-    }
-    display[index] = pack4x8unorm(vec4f(srgb_encode(color), 1.0));
+    display[index] = shown(pixel.rgb / max(pixel.a, 1.0), exposure_state[0]);
 }

@@ -128,6 +128,7 @@ impl Film {
         }
         recorder
             .pass(&table::FILM_ACCUMULATE)
+            .inspected_by(&table::FILM_INSPECT)
             .bind("radiance", &self.radiance)
             .bind("accumulation", &self.accumulation)
             .dispatch_over(self.size)
@@ -151,6 +152,11 @@ impl Film {
             .bind("exposure_state", &self.exposure_state)
             .bind("display", &self.display)
             .dispatch_over(self.size)
+    }
+
+    /// Automatic exposure in EV, in the first of its numbers.
+    pub fn exposure_state(&self) -> &wgpu::Buffer {
+        &self.exposure_state
     }
 
     /// The uniform, for passes outside the recorder.

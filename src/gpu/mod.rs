@@ -2,6 +2,7 @@
 
 pub mod albedo_table;
 pub mod data_texture;
+pub mod dissection;
 #[cfg(not(target_arch = "wasm32"))]
 mod plant;
 pub mod readback;

@@ -1,6 +1,7 @@
 //! Recording a frame: a straight line of passes, each a compute pass of its own with a label and timestamps.
 
 use super::Gpu;
+use super::dissection::{Dissection, Easel};
 use super::shader::{Resource, SceneFeatures, Shader};
 use crate::error::Result;
 use glam::UVec2;
@@ -78,6 +79,12 @@ pub struct Recorder<'a> {
     shared: Vec<(&'a str, Resource<'a>)>,
     /// What the scene of this frame has.
     pub features: SceneFeatures,
+    /// Whether a pixel is inspected.
+    pub observes: bool,
+    /// What keeps the pictures of passes, and what passes that only illustrate write to.
+    dissection: Option<(&'a mut Dissection, &'a Easel)>,
+    /// While the dissection's own passes are recorded: they are neither timed nor kept.
+    aside: bool,
 }
 
 impl<'a> Recorder<'a> {
@@ -87,7 +94,16 @@ impl<'a> Recorder<'a> {
             timer.clear();
         }
         let shared = vec![("albedo_table", Resource::Texture(&gpu.albedo_table))];
-        Recorder { gpu, encoder: frame_encoder(gpu), timer, shared, features: SceneFeatures::ALL }
+        Recorder {
+            gpu,
+            encoder: frame_encoder(gpu),
+            timer,
+            shared,
+            features: SceneFeatures::ALL,
+            observes: false,
+            dissection: None,
+            aside: false,
+        }
     }
 
     /// Binds a resource for every later pass that asks for it by name.
@@ -95,10 +111,59 @@ impl<'a> Recorder<'a> {
         self.shared.push((name, resource.into()));
     }
 
+    /// Keeps in `dissection` what the passes from now on write.
+    pub(crate) fn dissect(&mut self, dissection: &'a mut Dissection, easel: &'a Easel) {
+        self.dissection = Some((dissection, easel));
+    }
+
+    pub(super) fn gpu(&self) -> &'a Gpu {
+        self.gpu
+    }
+
     /// Starts describing a pass.
     pub fn pass<'r>(&'r mut self, shader: &'static Shader) -> Pass<'r, 'a> {
         let bound = self.shared.clone();
-        Pass { recorder: self, shader, bound }
+        Pass { recorder: self, shader, bound, illustrates: false, inspection: None }
+    }
+
+    /// While a frame is dissected: a pass whose `radiance_out` shows what the last pass has written, where that is no picture itself.
+    pub fn illustration<'r>(&'r mut self, shader: &'static Shader) -> Option<Pass<'r, 'a>> {
+        let (_, easel) = self.dissection.as_ref()?;
+        let easel: &'a Easel = easel;
+        let mut bound: Vec<(&'r str, Resource<'r>)> = self.shared.clone();
+        bound.push(("radiance_out", (&easel.radiance).into()));
+        bound.push(("counters", (&easel.counters).into()));
+        Some(Pass { recorder: self, shader, bound, illustrates: true, inspection: None })
+    }
+
+    fn run(&mut self, shader: &'static Shader, bound: &[(&str, Resource<'_>)], workgroups: [u32; 3]) -> Result<()> {
+        // Compiling may take a second: in a first frame the passes before run meanwhile.
+        if !self.gpu.has_pipeline(shader, self.features) {
+            self.flush();
+        }
+        let pipeline = self.gpu.pipeline(shader, self.features);
+        let groups = shader.bind_groups(self.gpu, &pipeline.groups, bound)?;
+        let timer = self.timer.as_mut().filter(|_| !self.aside);
+        let timestamp_writes = timer.and_then(|timer| {
+            let index = timer.names.len() as u32;
+            (index < MAXIMUM_TIMED_PASSES).then(|| {
+                timer.names.push(shader.id);
+                wgpu::ComputePassTimestampWrites {
+                    query_set: &timer.queries,
+                    beginning_of_pass_write_index: Some(2 * index),
+                    end_of_pass_write_index: Some(2 * index + 1),
+                }
+            })
+        });
+        let mut pass =
+            self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(shader.id), timestamp_writes });
+        pass.set_pipeline(&pipeline.pipeline);
+        for (index, group) in groups.iter().enumerate() {
+            pass.set_bind_group(index as u32, group, &[]);
+        }
+        let [x, y, z] = workgroups;
+        pass.dispatch_workgroups(x, y, z);
+        Ok(())
     }
 
     /// Submits what is recorded so far; the device runs it while this thread goes on.
@@ -127,6 +192,8 @@ pub struct Pass<'r, 'a> {
     recorder: &'r mut Recorder<'a>,
     shader: &'static Shader,
     bound: Vec<(&'r str, Resource<'r>)>,
+    illustrates: bool,
+    inspection: Option<&'static Shader>,
 }
 
 impl<'r> Pass<'r, '_> {
@@ -134,6 +201,13 @@ impl<'r> Pass<'r, '_> {
     #[must_use]
     pub fn bind(mut self, name: &'r str, resource: impl Into<Resource<'r>>) -> Self {
         self.bound.push((name, resource.into()));
+        self
+    }
+
+    /// Where a pixel is inspected, runs `inspection` after the pass, once, with what is bound to it.
+    #[must_use]
+    pub fn inspected_by(mut self, inspection: &'static Shader) -> Self {
+        self.inspection = Some(inspection);
         self
     }
 
@@ -151,33 +225,23 @@ impl<'r> Pass<'r, '_> {
     /// # Errors
     /// `SHADER` if something the shader needs was not bound.
     pub fn dispatch(self, workgroups: [u32; 3]) -> Result<()> {
-        let Pass { recorder, shader, bound } = self;
-        // Compiling may take a second: in a first frame the passes before run meanwhile.
-        if !recorder.gpu.has_pipeline(shader, recorder.features) {
-            recorder.flush();
+        let Pass { recorder, shader, bound, illustrates, inspection } = self;
+        let was_aside = recorder.aside;
+        recorder.aside |= illustrates;
+        recorder.run(shader, &bound, workgroups)?;
+        recorder.aside = true;
+        if let Some(inspection) = inspection.filter(|_| recorder.observes) {
+            recorder.run(inspection, &bound, [1; 3])?;
         }
-        let pipeline = recorder.gpu.pipeline(shader, recorder.features);
-        let groups = shader.bind_groups(recorder.gpu, &pipeline.groups, &bound)?;
-        let timestamp_writes = recorder.timer.as_mut().and_then(|timer| {
-            let index = timer.names.len() as u32;
-            (index < MAXIMUM_TIMED_PASSES).then(|| {
-                timer.names.push(shader.id);
-                wgpu::ComputePassTimestampWrites {
-                    query_set: &timer.queries,
-                    beginning_of_pass_write_index: Some(2 * index),
-                    end_of_pass_write_index: Some(2 * index + 1),
-                }
-            })
-        });
-        let mut pass = recorder
-            .encoder
-            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(shader.id), timestamp_writes });
-        pass.set_pipeline(&pipeline.pipeline);
-        for (index, group) in groups.iter().enumerate() {
-            pass.set_bind_group(index as u32, group, &[]);
+        if !was_aside && let Some((dissection, easel)) = recorder.dissection.take() {
+            if illustrates {
+                dissection.illustrate(recorder, &easel.radiance)?;
+            } else {
+                dissection.keep(recorder, shader, &bound)?;
+            }
+            recorder.dissection = Some((dissection, easel));
         }
-        let [x, y, z] = workgroups;
-        pass.dispatch_workgroups(x, y, z);
+        recorder.aside = was_aside;
         Ok(())
     }
 }

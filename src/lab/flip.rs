@@ -12,18 +12,26 @@ pub const PIXELS_PER_DEGREE: f64 = 67.0;
 
 /// Mean FLIP: 0 for equal pictures, at most 1; what an observer perceives when flipping between the two.
 ///
+/// # Errors
+/// As [`check_pair`].
+pub fn flip(image: &Image, reference: &Image) -> Result<f64> {
+    let map = flip_map(image, reference)?;
+    Ok(map.iter().sum::<f64>() / map.len() as f64)
+}
+
+/// FLIP of each pixel, row-major from the top.
+///
 /// Radiance is clamped to [0, 1] at exposure 0, as an sRGB display would show it.
 ///
 /// # Errors
 /// As [`check_pair`].
-pub fn flip(image: &Image, reference: &Image) -> Result<f64> {
+pub fn flip_map(image: &Image, reference: &Image) -> Result<Vec<f64>> {
     check_pair(image, reference)?;
     let (test, reference) = (Opponent::new(image), Opponent::new(reference));
     let colour = colour_difference(&test, &reference);
     let feature = feature_difference(&test.luma, &reference.luma);
     // Section 4.3: the feature difference raises the colour difference.
-    let combined = colour.zip(&feature, |colour, feature| colour.powf(1.0 - feature));
-    Ok(combined.values.iter().sum::<f64>() / combined.values.len() as f64)
+    Ok(colour.zip(&feature, |colour, feature| colour.powf(1.0 - feature)).values)
 }
 
 /// Linear sRGB to XYZ, from the primaries' chromaticities.

@@ -69,6 +69,23 @@ impl TechniqueInfo {
     }
 }
 
+/// A setting that makes the expected picture differ from the truth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct Bias {
+    /// The parameter's key: of the technique by its name, or `render.NAME`.
+    pub parameter: &'static str,
+    /// How the picture differs, for people.
+    pub why: &'static str,
+}
+
+/// Those of `(holds, parameter, why)` that hold.
+pub(crate) fn biases_that_hold(all: &[(bool, &'static str, &'static str)]) -> Vec<Bias> {
+    all.iter().filter(|(holds, ..)| *holds).map(|&(_, parameter, why)| Bias { parameter, why }).collect()
+}
+
+/// What darkens every technique that draws indirect light only if it is asked to.
+pub(crate) const NO_INDIRECT: &str = "light that scatters more than once is left out";
+
 /// One rendering method. It owns its buffers and records its passes; it knows nothing of windows, pages or other methods.
 pub trait Technique {
     /// What it is.
@@ -82,6 +99,11 @@ pub trait Technique {
 
     /// Parameter values as a JSON object.
     fn values(&self) -> serde_json::Value;
+
+    /// Which of its settings, as they are now, bias the picture; those of all techniques are in [`RenderParams::biases`].
+    fn biases(&self) -> Vec<Bias> {
+        Vec::new()
+    }
 
     /// Makes buffers for a picture size; called before the first frame and whenever size or parameters changed.
     ///

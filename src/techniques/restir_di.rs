@@ -1,7 +1,7 @@
 //! `restir-di`: spatiotemporal reservoir resampling of direct light, as Bitterli et al. 2020 with the switches of thesis
 //! 001, section 5.1.
 
-use super::{Technique, TechniqueInfo, candidates, reuse};
+use super::{Bias, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold, candidates, reuse};
 use crate::error::Result;
 use crate::gpu::{Gpu, recorder::Recorder, shader::table};
 use crate::params::Params;
@@ -134,6 +134,8 @@ impl RestirDiParams {
 struct RestirDi {
     params: RestirDiParams,
     uniform: wgpu::Buffer,
+    /// The same without indirect light, for pictures of reservoirs on their own.
+    direct_only: wgpu::Buffer,
     pass_indices: Vec<wgpu::Buffer>,
     buffers: Option<Buffers>,
 }
@@ -162,6 +164,7 @@ impl RestirDi {
         RestirDi {
             params: RestirDiParams::default(),
             uniform: gpu.uniform("restir-di.params", std::mem::size_of::<RestirDiParams>() as u64),
+            direct_only: gpu.uniform("restir-di.params", std::mem::size_of::<RestirDiParams>() as u64),
             pass_indices,
             buffers: None,
         }
@@ -187,8 +190,35 @@ impl Technique for RestirDi {
         self.params.values()
     }
 
+    fn biases(&self) -> Vec<Bias> {
+        let RestirDiParams { temporal_reuse, spatial_reuse, visibility_reuse, visibility_in_weights, .. } = self.params;
+        let reuses = temporal_reuse == 1 || spatial_reuse == 1;
+        let by_count = matches!(reuse::WEIGHTS[self.params.reuse_weights as usize], "constant" | "heuristics");
+        let unseen = visibility_reuse == 1 && visibility_in_weights == 0;
+        biases_that_hold(&[
+            (
+                reuses && by_count,
+                "reuse_weights",
+                "1/M: too dark where pixels that share samples differ, as at edges of shadows and in corners",
+            ),
+            (
+                reuses && !by_count && unseen,
+                "visibility_in_weights",
+                "too dark at the edges of shadows, for shadowed samples are not passed on",
+            ),
+            (
+                self.params.boiling_filter > 0.0,
+                "boiling_filter",
+                "what is far brighter than its surroundings is thrown away: darker",
+            ),
+            (self.params.indirect == 0, "indirect", NO_INDIRECT),
+        ])
+    }
+
     fn prepare(&mut self, gpu: &Gpu, size: UVec2) -> Result<()> {
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&self.params));
+        let direct_only = RestirDiParams { indirect: 0, ..self.params };
+        gpu.queue.write_buffer(&self.direct_only, 0, bytemuck::bytes_of(&direct_only));
         let (slots, words) = (self.params.slots(), self.params.reservoir_words(size));
         if let Some(buffers) = self.buffers.as_mut().filter(|b| b.made_for == (size, words)) {
             buffers.has_history = false;
@@ -224,11 +254,24 @@ impl Technique for RestirDi {
         candidates::specialise(&mut recorder.features, self.params.light_choice, self.params.bsdf_samples);
         recorder
             .pass(&table::RESTIR_DI_INITIAL)
+            .inspected_by(&table::RESTIR_DI_INSPECT_INITIAL)
             .bind("params", &self.uniform)
             .bind("reservoirs_out", &reservoirs[current])
             .dispatch_over(size)?;
         // Indirect light draws its lights as the path tracer does.
         recorder.features = features;
+        // What reservoirs stand for, where the frame is taken apart.
+        let show = |recorder: &mut Recorder<'_>, reservoirs: &wgpu::Buffer| match recorder
+            .illustration(&table::RESTIR_DI_SHADE)
+        {
+            Some(pass) => pass
+                .bind("params", &self.direct_only)
+                .bind("reservoirs", reservoirs)
+                .bind("indirect_radiance", &buffers.indirect)
+                .dispatch_over(size),
+            None => Ok(()),
+        };
+        show(recorder, &reservoirs[current])?;
         // Without a history the pass would only copy; and the first picture need not wait for its pipeline.
         if self.params.temporal_reuse == 1 && buffers.has_history {
             // Of two reservoirs pairwise weights are the balance heuristic; a share kept for the newer one would only make the
@@ -237,6 +280,8 @@ impl Technique for RestirDi {
             recorder.features.reuse_defensive = false;
             recorder
                 .pass(&table::RESTIR_DI_TEMPORAL)
+                .inspected_by(&table::RESTIR_DI_INSPECT_TEMPORAL)
+                .inspected_by(&table::RESTIR_DI_INSPECT_TEMPORAL)
                 .bind("params", &self.uniform)
                 .bind("reservoirs", &reservoirs[current])
                 .bind("reservoirs_previous", &reservoirs[history])
@@ -244,6 +289,7 @@ impl Technique for RestirDi {
                 .dispatch_over(size)?;
             recorder.features = features;
             std::mem::swap(&mut current, &mut spare);
+            show(recorder, &reservoirs[current])?;
         }
         if self.params.boiling_filter > 0.0 {
             recorder
@@ -253,12 +299,16 @@ impl Technique for RestirDi {
                 .bind("reservoirs_out", &reservoirs[spare])
                 .dispatch_over(size)?;
             std::mem::swap(&mut current, &mut spare);
+            show(recorder, &reservoirs[current])?;
         }
         let found_in_time = current;
         if self.params.spatial_reuse == 1 {
             for pass_index in self.pass_indices.iter().take(self.params.spatial_iterations as usize) {
                 recorder
                     .pass(&table::RESTIR_DI_SPATIAL)
+                    .inspected_by(&table::RESTIR_DI_INSPECT_SPATIAL)
+                    .inspected_by(&table::RESTIR_DI_INSPECT_SPATIAL)
+                    .inspected_by(&table::RESTIR_DI_INSPECT_SPATIAL)
                     .bind("params", &self.uniform)
                     .bind("pass_index", pass_index)
                     .bind("reservoirs", &reservoirs[current])
@@ -269,6 +319,7 @@ impl Technique for RestirDi {
                 let free = if current == found_in_time { history } else { current };
                 current = spare;
                 spare = free;
+                show(recorder, &reservoirs[current])?;
             }
         }
         if self.params.indirect == 1 {

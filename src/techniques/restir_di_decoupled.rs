@@ -1,6 +1,6 @@
 //! `restir-di-decoupled`: the production pipeline of Wyman and Panteleev 2021, light tiles and decoupled shading.
 
-use super::{Technique, TechniqueInfo};
+use super::{Bias, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, recorder::Recorder, shader::table};
 use crate::params::Params;
@@ -211,6 +211,28 @@ impl Technique for RestirDiDecoupled {
 
     fn values(&self) -> serde_json::Value {
         self.params.values()
+    }
+
+    fn biases(&self) -> Vec<Bias> {
+        let RestirDiDecoupledParams { temporal_reuse, spatiotemporal_reuse, visibility, .. } = self.params;
+        let reuses = temporal_reuse == 1 || spatiotemporal_reuse == 1;
+        let visibility_bias = match visibility {
+            0 => Some("no shadows: far too bright"),
+            2 if reuses => Some("too bright in contact shadows, for reused samples are shaded as lit"),
+            3 if reuses => Some("weights depend on the samples: too dark at the edges of shadows, or too bright"),
+            4 | 5 if reuses => Some("too dark at the edges of shadows"),
+            _ => None,
+        };
+        biases_that_hold(&[
+            (visibility_bias.is_some(), "visibility", visibility_bias.unwrap_or_default()),
+            (
+                reuses && self.params.reuse_weights == REUSE_WEIGHTS_HEURISTICS,
+                "reuse_weights",
+                "1/M: too dark where pixels that share samples differ",
+            ),
+            (self.params.checkerboard == 1, "checkerboard", "shadows lag by a frame in every other pixel"),
+            (self.params.indirect == 0, "indirect", NO_INDIRECT),
+        ])
     }
 
     fn prepare(&mut self, gpu: &Gpu, size: UVec2) -> Result<()> {

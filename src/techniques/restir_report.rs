@@ -1,6 +1,6 @@
 //! `restir-report`: the system of report 003, with its faults as switches beside the corrected form.
 
-use super::{Technique, TechniqueInfo};
+use super::{Bias, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold};
 use crate::error::Result;
 use crate::gpu::{Gpu, recorder::Recorder, shader::table};
 use crate::params::Params;
@@ -73,6 +73,8 @@ const STRATEGIES: u64 = 2;
 struct RestirReport {
     params: RestirReportParams,
     uniform: wgpu::Buffer,
+    /// The same without indirect light, for pictures of reservoirs on their own.
+    direct_only: wgpu::Buffer,
     buffers: Option<Buffers>,
 }
 
@@ -93,6 +95,7 @@ impl RestirReport {
         RestirReport {
             params: RestirReportParams::default(),
             uniform: gpu.uniform("restir-report.params", std::mem::size_of::<RestirReportParams>() as u64),
+            direct_only: gpu.uniform("restir-report.params", std::mem::size_of::<RestirReportParams>() as u64),
             buffers: None,
         }
     }
@@ -117,8 +120,45 @@ impl Technique for RestirReport {
         self.params.values()
     }
 
+    fn biases(&self) -> Vec<Bias> {
+        let RestirReportParams { fault_count_weights, .. } = self.params;
+        let (temporal, spatial) = self.reuse();
+        let reuses = temporal || spatial;
+        biases_that_hold(&[
+            (
+                reuses && self.params.fault_sample_count == 1,
+                "fault_sample_count",
+                "too bright, and with temporal reuse brighter every frame",
+            ),
+            (
+                reuses && self.params.fault_target_not_reevaluated == 1,
+                "fault_target_not_reevaluated",
+                "too bright on the whole, and light leaks across edges and corners",
+            ),
+            (reuses && fault_count_weights == 1, "fault_count_weights", "too dark at edges and corners"),
+            (
+                temporal && fault_count_weights == 1 && self.params.fault_no_reprojection == 1,
+                "fault_no_reprojection",
+                "with fault_count_weights: too dark where the camera has moved",
+            ),
+            (
+                spatial && fault_count_weights == 1 && self.params.fault_no_similarity == 1,
+                "fault_no_similarity",
+                "with fault_count_weights: too dark at edges and corners",
+            ),
+            (
+                self.params.fault_unguarded_pdf == 1,
+                "fault_unguarded_pdf",
+                "what is no number is left out of the picture",
+            ),
+            (self.params.indirect == 0, "indirect", NO_INDIRECT),
+        ])
+    }
+
     fn prepare(&mut self, gpu: &Gpu, size: UVec2) -> Result<()> {
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&self.params));
+        let direct_only = RestirReportParams { indirect: 0, ..self.params };
+        gpu.queue.write_buffer(&self.direct_only, 0, bytemuck::bytes_of(&direct_only));
         if let Some(buffers) = self.buffers.as_mut().filter(|buffers| buffers.size == size) {
             buffers.has_history = false;
             return Ok(());
@@ -142,12 +182,24 @@ impl Technique for RestirReport {
         let history = buffers.history;
         let mut current = (history + 1) % 3;
         let mut spare = (history + 2) % 3;
+        // What reservoirs stand for, where the frame is taken apart.
+        let show = |recorder: &mut Recorder<'_>, reservoirs: &wgpu::Buffer| match recorder
+            .illustration(&table::RESTIR_REPORT_SHADE)
+        {
+            Some(pass) => pass
+                .bind("params", &self.direct_only)
+                .bind("reservoirs", reservoirs)
+                .bind("indirect_radiance", &buffers.indirect)
+                .dispatch_over(size),
+            None => Ok(()),
+        };
 
         recorder
             .pass(&table::RESTIR_REPORT_INITIAL)
             .bind("params", &self.uniform)
             .bind("reservoirs_out", &reservoirs[current])
             .dispatch_over(size)?;
+        show(recorder, &reservoirs[current])?;
         if temporal_reuse && buffers.has_history {
             recorder
                 .pass(&table::RESTIR_REPORT_TEMPORAL)
@@ -157,6 +209,7 @@ impl Technique for RestirReport {
                 .bind("reservoirs_out", &reservoirs[spare])
                 .dispatch_over(size)?;
             std::mem::swap(&mut current, &mut spare);
+            show(recorder, &reservoirs[current])?;
         }
         if spatial_reuse {
             recorder
@@ -166,6 +219,7 @@ impl Technique for RestirReport {
                 .bind("reservoirs_out", &reservoirs[spare])
                 .dispatch_over(size)?;
             current = spare;
+            show(recorder, &reservoirs[current])?;
         }
         if self.params.indirect == 1 {
             recorder.pass(&table::COMMON_INDIRECT).bind("indirect_out", &buffers.indirect).dispatch_over(size)?;

@@ -59,6 +59,7 @@ impl Technique for Ris {
     }
     fn record(&mut self, recorder: &mut Recorder<'_>, size: UVec2) -> Result<()> {
         candidates::specialise(&mut recorder.features, self.params.light_choice, self.params.bsdf_samples);
-        recorder.pass(&table::RIS_RIS).bind("params", &self.uniform).dispatch_over(size)
+        let pass = recorder.pass(&table::RIS_RIS).inspected_by(&table::RIS_INSPECT);
+        pass.bind("params", &self.uniform).dispatch_over(size)
     }
 }

@@ -2,6 +2,8 @@
 //! crate `restir-loader`, which reads files. What both share is here; errors become `{code, message}` objects.
 
 #[cfg(feature = "viewer")]
+mod measure;
+#[cfg(feature = "viewer")]
 mod viewer;
 
 use crate::{Error, FlatScene, Scene};

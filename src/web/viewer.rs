@@ -2,15 +2,13 @@
 
 use super::{JsResult, Lighting, OrJs, flatten, js_error, surround_by_name};
 use crate::film::blit::Blit;
+use crate::gpu::dissection::Dissection;
 use crate::gpu::{Gpu, GpuOptions, instance};
-use crate::lab::metrics;
 use crate::pace::Pace;
 use crate::scene::{Camera, Projection, builtin};
-use crate::{Error, FlatScene, Image, Renderer};
+use crate::{Error, FlatScene, Renderer};
 use glam::{UVec2, Vec3};
-use std::cell::RefCell;
 use std::pin::Pin;
-use std::rc::Rc;
 use wasm_bindgen::prelude::*;
 
 /// Runs once when the module is loaded: a panic becomes a console error with a stack.
@@ -63,19 +61,42 @@ async fn receive(bytes: &js_sys::Uint8Array, pace: &mut Pace) -> JsResult<FlatSc
     FlatScene::receive(bytes.length() as usize, read, pace).await.js()
 }
 
+/// A graphics device, and the pipelines made on it: one for all viewers of a page.
+#[wasm_bindgen]
+pub struct Device {
+    instance: wgpu::Instance,
+    gpu: Gpu,
+}
+
+#[wasm_bindgen]
+impl Device {
+    /// The first GPU, or a software adapter where there is none.
+    pub async fn open() -> JsResult<Device> {
+        let instance = instance();
+        let gpu = Gpu::from_instance(&instance, None, &GpuOptions::default()).await.js()?;
+        Ok(Device { instance, gpu })
+    }
+
+    /// Whether it was lost, or has reported an error: then it is of no use any more.
+    pub fn is_lost(&self) -> bool {
+        self.gpu.check().is_err()
+    }
+}
+
 /// A renderer that presents to a canvas.
 #[wasm_bindgen]
 pub struct Viewer {
     renderer: Renderer,
     blit: Blit,
-    /// What `errors` compares with. Shared with the promises that read pictures back.
-    reference: Rc<RefCell<Option<Image>>>,
+    /// The last frame that was taken apart.
+    dissection: Option<Dissection>,
 }
 
 #[wasm_bindgen]
 impl Viewer {
     /// A viewer of a flattened scene at `width` x `height` pixels.
     pub async fn create(
+        device: &Device,
         canvas: web_sys::HtmlCanvasElement,
         flat_scene: js_sys::Uint8Array,
         width: u32,
@@ -83,14 +104,14 @@ impl Viewer {
     ) -> JsResult<Viewer> {
         let mut pace = pace();
         let scene = receive(&flat_scene, &mut pace).await?;
-        let instance = instance();
-        let surface = instance
+        let surface = device
+            .instance
             .create_surface(wgpu::SurfaceTarget::Canvas(canvas))
             .map_err(|e| js_error(&Error::NoAdapter(e.to_string())))?;
-        let gpu = Gpu::from_instance(&instance, Some(&surface), &GpuOptions::default()).await.js()?;
+        let gpu = device.gpu.clone();
         let blit = Blit::new(&gpu, surface);
         let renderer = Renderer::prepare(gpu, scene, UVec2::new(width, height), &mut pace).await.js()?;
-        Ok(Viewer { renderer, blit, reference: Rc::default() })
+        Ok(Viewer { renderer, blit, dissection: None })
     }
 
     /// Replaces the scene by another flattened one.
@@ -252,33 +273,58 @@ impl Viewer {
 
 #[wasm_bindgen]
 impl Viewer {
-    /// Keeps the picture, averaged and linear, as the reference.
-    pub fn keep_reference(&self) -> js_sys::Promise {
-        let (read, reference) = (self.renderer.read_image(), self.reference.clone());
+    /// The averaged picture, linear Rec. 709: three numbers a pixel, row-major from the top.
+    pub fn read_picture(&self) -> js_sys::Promise {
+        let read = self.renderer.read_image();
         wasm_bindgen_futures::future_to_promise(async move {
-            let image = read.await.js()?;
-            *reference.borrow_mut() = Some(image);
-            Ok(JsValue::UNDEFINED)
+            Ok(js_sys::Float32Array::from(read.await.js()?.pixels.as_flattened()).into())
         })
     }
 
-    /// How far the picture is from the reference, as JSON: `mse`, `relmse`, `mape`, and `bias`, the signed one of mean luminance; the last two as
-    /// fractions, null where the reference is black.
-    pub fn errors(&self) -> js_sys::Promise {
-        let (read, reference) = (self.renderer.read_image(), self.reference.clone());
+    /// Which settings, as they are now, bias the picture, as JSON: `parameter` and `why`.
+    pub fn biases(&self) -> String {
+        serde_json::json!(self.renderer.biases()).to_string()
+    }
+
+    /// Has frames from now on observed at a pixel from the top left; two numbers, or none to end it.
+    pub fn inspect(&mut self, pixel: &[u32]) -> JsResult<()> {
+        self.renderer.inspect(pixel.first_chunk().map(|&[x, y]| UVec2::new(x, y))).js()
+    }
+
+    /// What was seen at that pixel in the last frame, as JSON: [`crate::inspect::Inspection`].
+    pub fn inspection(&self) -> js_sys::Promise {
+        let read = self.renderer.inspection();
+        wasm_bindgen_futures::future_to_promise(
+            async move { Ok(serde_json::json!(read.await.js()?).to_string().into()) },
+        )
+    }
+
+    /// Renders one frame, presents it, and keeps what its passes wrote. JSON: `id` of each pass, its `file` in shaders/, and whether it
+    /// `has_picture`.
+    pub fn dissect(&mut self) -> JsResult<String> {
+        let dissection = self.renderer.dissect_frame().js()?;
+        self.present()?;
+        let stages: Vec<_> = dissection.stages.iter().map(|stage| {
+            serde_json::json!({"id": stage.shader.id, "file": stage.shader.file, "has_picture": stage.has_picture()})
+        }).collect();
+        self.dissection = Some(dissection);
+        Ok(serde_json::json!(stages).to_string())
+    }
+
+    /// The picture of a pass of that frame: RGBA8, row-major from the top; empty where it has none.
+    pub fn dissected(&self, stage: usize) -> js_sys::Promise {
+        let read = self.dissection.as_ref().map(|dissection| dissection.read(self.renderer.gpu(), stage));
         wasm_bindgen_futures::future_to_promise(async move {
-            let image = read.await.js()?;
-            let reference = reference.borrow();
-            let reference = reference.as_ref().ok_or_else(|| Error::bad_value("reference", "there is none")).js()?;
-            let [.., luminance] = metrics::bias(&image, reference).js()?;
-            let errors = serde_json::json!({
-                "mse": metrics::mse(&image, reference).js()?,
-                "relmse": metrics::relmse(&image, reference).js()?,
-                "mape": metrics::mape(&image, reference).js()?,
-                "bias": luminance.relative,
-            });
-            Ok(errors.to_string().into())
+            match read {
+                Some(read) => Ok(js_sys::Uint8Array::from(read.await.js()?.as_slice()).into()),
+                None => Err(js_error(&Error::bad_value("dissected", "no frame was taken apart"))),
+            }
         })
+    }
+
+    /// Lets go of that frame.
+    pub fn forget_dissection(&mut self) {
+        self.dissection = None;
     }
 }
 

@@ -1,5 +1,6 @@
 // Candidates of resampled importance sampling and what is selected from them: samples of lights, and points of lights that
 // rays drawn for the BSDF ran into.
+// The including pass says by `observe_candidate` whether anybody looks on (observed.wgsl, unobserved.wgsl).
 // Sources: Talbot et al. 2005; Bitterli et al. 2020, Algorithm 3; thesis 000, listing 3; Wyman and Panteleev 2021, Eq. 11
 // to 13 (stratified: every stream has a set of candidates of its own; else all select from one).
 #include "techniques/common/resampling.wgsl"
@@ -34,6 +35,7 @@ fn select_candidates(surface: Surface, settings: CandidateSettings, rng: ptr<fun
         let group = i / count;
         let sample = draw_candidate(surface, i - group * count >= settings.light_samples, rng);
         let weight = candidate_weight(surface, sample, settings.light_samples, settings.bsdf_samples);
+        observe_candidate(group, sample, weight);
         let u = random_4(rng);
         for (var slot = 0u; slot < settings.streams; slot += 1u) {
             if settings.stratified == 1u && slot != group {

@@ -81,6 +81,8 @@ fn store_reservoir(pixel: vec2u, slot: u32, reservoir: Reservoir) {
 }
 
 // What is passed on as it is. A packed reservoir comes back from packing again as it was.
-fn keep_reservoir(pixel: vec2u, slot: u32) {
-    store_reservoir(pixel, slot, load_reservoir(pixel, slot));
+fn keep_reservoir(pixel: vec2u, slot: u32) -> Reservoir {
+    let reservoir = load_reservoir(pixel, slot);
+    store_reservoir(pixel, slot, reservoir);
+    return reservoir;
 }

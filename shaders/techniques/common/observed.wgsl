@@ -1,0 +1,76 @@
+// The pixel inspector's notes. A pass of it is one invocation that runs the code of another pass once more for one pixel, with
+// the same random numbers, and writes down what it sees there: candidates, domains that are joined, the reservoir that comes out.
+// That code calls `observe_...` where there is something to see; in the pass itself these do nothing (unobserved.wgsl). The
+// including pass begins with `observe_begin`, and says by `observe_result` what it notes of a reservoir that is done.
+#include "scene/trace.wgsl"
+#include "scene/visibility_buffer.wgsl"
+#include "techniques/common/resampling.wgsl"
+#include "techniques/common/observations.wgsl"
+
+var<private> observed_surface: Surface;
+var<private> observed_stage: u32;
+// Of the domains of a combination.
+var<private> observed_pixels: array<vec2u, 17>;
+
+// Whether the inspected pixel shows a surface; without one there is nothing to note.
+fn observe_begin(stage: u32) -> bool {
+    observed_stage = stage;
+    if any(inspected.pixel >= frame.size) || !pixel_has_surface(inspected.pixel) {
+        return false;
+    }
+    observed_surface = load_pixel(inspected.pixel);
+    return true;
+}
+
+fn observe(given: Observation) {
+    let at = trace.head.count;
+    trace.head.count += 1u;
+    if at >= inspected.capacity {
+        return;
+    }
+    var note = given;
+    note.stage = observed_stage;
+    if note.light != NONE {
+        let valued = value_sample(observed_surface, LightSample(note.light, note.point), false);
+        note.direction = valued.direction;
+        note.distance = valued.distance;
+        note.target_value = valued.target_value;
+    }
+    trace.observations[at] = note;
+}
+
+fn observation(kind: u32, slot: u32, sample: LightSample) -> Observation {
+    var note = Observation();
+    note.kind = kind;
+    note.slot = slot;
+    note.light = sample.light;
+    note.point = sample.point;
+    note.pixel = vec2u(NONE);
+    return note;
+}
+
+fn observe_candidate(slot: u32, sample: LightSample, weight: f32) {
+    var note = observation(OBSERVATION_CANDIDATE, slot, sample);
+    note.resampling_weight = weight;
+    observe(note);
+}
+
+fn observe_domain(domain: u32, pixel: vec2u) {
+    observed_pixels[domain] = pixel;
+}
+
+fn observe_rejected(pixel: vec2u) {
+    var note = observation(OBSERVATION_REJECTED, 0u, LightSample(NONE, 0u));
+    note.pixel = pixel;
+    observe(note);
+}
+
+fn observe_reservoir(slot: u32, reservoir: Reservoir, reason: u32) {
+    var note = observation(OBSERVATION_RESULT, slot, reservoir_sample(reservoir));
+    note.unbiased_contribution_weight = reservoir.unbiased_contribution_weight;
+    note.confidence_weight = reservoir.confidence_weight;
+    note.reason = reason;
+    let valued = value_sample(observed_surface, reservoir_sample(reservoir), false);
+    note.is_visible = u32(valued.target_value > 0.0 && sample_is_visible(observed_surface, valued, false));
+    observe(note);
+}

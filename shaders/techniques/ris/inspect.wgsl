@@ -1,0 +1,17 @@
+// The pixel inspector at ris/ris.
+// One invocation in all. Reads what that pass reads for the inspected pixel. Writes notes on every candidate and on what is
+// selected.
+// Source: that of ris/ris.
+#include "techniques/common/observed.wgsl"
+#include "techniques/ris/resample.wgsl"
+
+fn observe_result(slot: u32, reservoir: Reservoir, reason: u32) {
+    observe_reservoir(slot, reservoir, reason);
+}
+
+@compute @workgroup_size(1)
+fn main() {
+    if observe_begin(0u) {
+        _ = pixel_radiance(inspected.pixel);
+    }
+}

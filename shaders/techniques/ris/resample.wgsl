@@ -1,0 +1,35 @@
+// What a pixel shows by resampled importance sampling: the code of ris/ris and of its inspection.
+#include "scene/visibility_buffer.wgsl"
+#include "techniques/common/candidates.wgsl"
+
+struct RisParams {
+    candidates: u32, // M
+    bsdf_samples: u32,
+    light_choice: u32,
+    samples: u32, // N
+    stratified: u32,
+}
+
+@group(1) @binding(3) var<uniform> params: RisParams;
+
+fn pixel_radiance(pixel: vec2u) -> vec3f {
+    if !pixel_has_surface(pixel) {
+        return environment_evaluate(primary_ray(pixel).direction);
+    }
+    let surface = load_pixel(pixel);
+    if frame.light_count == 0u {
+        return surface.emission;
+    }
+    var rng = rng_new(pixel, frame.index, frame.seed, STREAM_INITIAL);
+    let settings = CandidateSettings(params.candidates, params.bsdf_samples, params.samples, params.stratified);
+    select_candidates(surface, settings, &rng);
+    var direct = vec3f(0.0);
+    for (var i = 0u; i < params.samples; i += 1u) {
+        let selected = streams[i].selected;
+        let weight = stream_contribution_weight(streams[i], target_function(surface, selected, false));
+        let reservoir = Reservoir(selected.light, selected.point, weight, 1.0);
+        direct += shade_reservoir(surface, reservoir);
+        observe_result(i, reservoir, REASON_NONE);
+    }
+    return surface.emission + direct / f32(params.samples);
+}
