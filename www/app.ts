@@ -1,4 +1,5 @@
 // The page: joins the menus, the panel, the URL and the notices to a viewer.
+import { type Address, type OwnFiles, PageAddress, readAddress } from './address.js';
 import type { Description, SceneReport, Stats, TechniqueInfo } from './api.js';
 import { acceptDrops } from './files.js';
 import { byId, clearError, showError, showProgress, showStatus, showWarnings } from './notices.js';
@@ -9,8 +10,7 @@ import { type Group, fillMenu, filterPanel, showPanel } from './panel.js';
 import type { Contents, SceneSource } from './protocol.js';
 import { TimeControls } from './time.js';
 import { showTiming } from './timing.js';
-import { readQuery } from './url-state.js';
-import { RestirViewer, type Sample, type Scene, type ViewerFailure } from './viewer.js';
+import { type Change, RestirViewer, type Sample, type Scene, type ViewerFailure } from './viewer.js';
 
 const defaultScene = 'cornell';
 /** Milliseconds between read-backs of counters and timings. */
@@ -32,19 +32,10 @@ const scales: [string, string][] = [
 const menu = (id: string) => byId(id, HTMLSelectElement);
 const button = (id: string) => byId(id, HTMLButtonElement);
 
-const without = (query: URLSearchParams, key: string) => {
-  const rest = new URLSearchParams(query);
-  rest.delete(key);
-  return rest.toString();
-};
-
 class App {
-  private readonly address = new URLSearchParams(location.search);
-  /** The settings of the second picture, where the address has one. */
-  private readonly secondQuery = this.address.get('b');
-  private readonly query = readQuery(without(this.address, 'b'));
+  private readonly query = readAddress(location.search);
   readonly view = new RestirViewer(byId('canvas', HTMLCanvasElement), this.query.state);
-  readonly compare = new Compare(this.view, () => this.showCompare());
+  readonly compare = new Compare(this.view, (change) => this.showCompare(change));
   /** Whose settings the panel shows. */
   private edited = this.view;
   private readonly time = new TimeControls({
@@ -53,16 +44,25 @@ class App {
     speed: (factor) => void this.view.setSpeed(factor),
     animation: (index) => void this.view.setAnimation(index),
   });
+  private readonly address = new PageAddress(
+    () => this.link(),
+    () => this.ownFiles(),
+    (address, files) => this.showAddress(address, files),
+  );
   private description: Description | undefined;
   private stats: Stats | undefined;
   private statsTime = 0;
-  private urlTimer = 0;
   /** Of the last frame: rendered pixels, frames in the picture, and the scene's moment. */
   private size: [number, number] = [1280, 720];
   private frames = 0;
   private moment = 0;
 
-  async start(): Promise<void> {
+  /** Shows what the address says. */
+  open(): Promise<void> {
+    return this.address.restore(this.start());
+  }
+
+  private async start(): Promise<void> {
     const { view } = this;
     const { scene = defaultScene, environment, sceneIndex, variant } = this.query.state;
     const choice = { ...(sceneIndex !== undefined && { scene: sceneIndex }), ...(variant !== undefined && { variant }) };
@@ -81,7 +81,7 @@ class App {
     }
     try {
       await opening;
-      if (this.secondQuery !== null) await this.compare.open(this.secondQuery);
+      if (this.query.second !== undefined) await this.compare.open(this.query.second);
     } catch (problem) {
       // The user has chosen something else meanwhile.
       if (view.loading) return;
@@ -103,7 +103,14 @@ class App {
     view.addEventListener('sample', ({ detail }) => this.showSample(detail));
     view.addEventListener('error', ({ detail }) => this.showFailure(detail));
     view.addEventListener('restored', clearError);
-    for (const change of ['camera-change', 'param-change'] as const) view.addEventListener(change, () => this.writeUrl());
+    view.addEventListener('camera-change', () => this.address.changed());
+    view.addEventListener('param-change', ({ detail }) => this.noteChange(detail));
+  }
+
+  /** What is chosen from a menu can be taken back by the browser's Back. */
+  private noteChange({ name }: Change): void {
+    if (['technique', 'preset', 'view'].includes(name)) this.address.chosen();
+    else this.address.changed();
   }
 
   private showFailure(failure: ViewerFailure): void {
@@ -130,14 +137,43 @@ class App {
     const { report, cameras, contents } = scene;
     clearError();
     showProgress(undefined);
-    // Those of the address are told once.
-    showWarnings([...this.query.warnings.splice(0), ...report.warnings]);
+    this.showWarnings(report);
     fillMenu(menu('camera'), cameras.map((camera, index) => [String(index), camera.name || `camera ${index}`]), String(this.view.cameraIndex));
     this.showMenus();
     this.showSources(scene);
     this.showContents(scene.source, contents);
     this.showTime(report);
-    this.writeUrl();
+    this.address.chosen();
+  }
+
+  private showWarnings(report: SceneReport): void {
+    // Those of the address are told once.
+    showWarnings([...this.query.warnings.splice(0), ...report.warnings]);
+  }
+
+  /** Where the scene or what surrounds it are files of the user's, these. */
+  private ownFiles(): OwnFiles | undefined {
+    const { source, surroundings } = this.view.scene ?? {};
+    return source && (source.kind === 'file' || surroundings?.bytes) ? { source, surroundings } : undefined;
+  }
+
+  /** Shows what an address says to which the user has gone back. */
+  private async showAddress(address: Address, files: OwnFiles | undefined): Promise<void> {
+    const { view, compare } = this;
+    const before = view.scene;
+    this.query.warnings.push(...address.warnings);
+    const showing = view.show(address.state, files);
+    await this.settle(showing);
+    // Gone further meanwhile, or there is nothing to compare with.
+    if ((await showing.then(() => false, () => true)) || view.loading) return;
+    if (address.second === undefined) compare.close();
+    else await compare.show(address.second);
+    this.showMenus();
+    // Another scene has been shown with all that belongs to it.
+    if (!view.scene || view.scene !== before) return;
+    menu('camera').value = String(view.cameraIndex);
+    this.showTime(view.scene.report);
+    this.showWarnings(view.scene.report);
   }
 
   // Time
@@ -309,12 +345,13 @@ class App {
     this.showMenus();
   }
 
-  private showCompare(): void {
+  private showCompare(change?: Change): void {
     const { other } = this.compare;
     byId('target-row', HTMLElement).hidden = !other;
     button('compare').setAttribute('aria-pressed', String(other !== undefined));
     if (!other && this.edited !== this.view) this.edit('a');
-    this.writeUrl();
+    if (change) this.noteChange(change);
+    else this.address.chosen();
   }
 
   private viewers(): RestirViewer[] {
@@ -369,14 +406,6 @@ class App {
     setTimeout(() => (from.textContent = label), 1500);
   }
 
-  /** Writes the address a moment later: a slider moves faster than browsers allow the address to change. */
-  private writeUrl(): void {
-    clearTimeout(this.urlTimer);
-    this.urlTimer = window.setTimeout(() => {
-      history.replaceState(null, '', this.link());
-    }, 300);
-  }
-
   // Frames
 
   private showSample(sample: Sample): void {
@@ -415,4 +444,4 @@ window.restir = {
   other: (work) => app.compare.other?.call(work) ?? Promise.reject(new Error('there is no second picture')),
 };
 
-void app.start();
+void app.open();

@@ -1,21 +1,23 @@
 // A second picture over the first: the same scene, camera and moment with other settings, parted by a divider that can be moved.
 import { byId } from './notices.js';
 import { type Settings, readQuery, writeQuery } from './url-state.js';
-import { RestirViewer } from './viewer.js';
+import { type Change, RestirViewer } from './viewer.js';
 
 /** What of the settings is of a picture alone; all else is shared. */
 const own = ({ technique, view, values }: Settings): Partial<Settings> => ({ technique, view, values });
 
 export class Compare {
   private second: RestirViewer | undefined;
+  /** The second picture's latest change of scene. */
+  private following: Promise<void> = Promise.resolve();
   /** Percent of the width that shows the first picture. */
   private share = 50;
   private readonly divider = byId('divider', HTMLElement);
 
   constructor(
     private readonly first: RestirViewer,
-    /** The second picture's settings have changed, or it has come or gone. */
-    private readonly changed: () => void,
+    /** A setting of the second picture's has changed, or it has come or gone. */
+    private readonly changed: (change?: Change) => void,
   ) {
     const { divider } = this;
     divider.addEventListener('pointerdown', (event) => divider.setPointerCapture(event.pointerId));
@@ -29,7 +31,7 @@ export class Compare {
       this.part(to);
     });
     first.addEventListener('camera-change', ({ detail }) => void this.second?.setCamera(detail));
-    first.addEventListener('load', () => void this.second?.showAs(first));
+    first.addEventListener('load', () => this.follow());
     first.addEventListener('param-change', ({ detail }) => this.pass(detail.name));
   }
 
@@ -52,7 +54,7 @@ export class Compare {
     Object.assign(canvas, { id: 'canvas-b', ariaHidden: 'true' });
     byId('canvas', HTMLCanvasElement).after(canvas);
     const second = (this.second = new RestirViewer(canvas, { ...first.settings, ...given }));
-    second.addEventListener('param-change', this.changed);
+    second.addEventListener('param-change', ({ detail }) => this.changed(detail));
     // A fault of the second's is told as the first's are.
     second.addEventListener('error', ({ detail }) => first.dispatchEvent(new CustomEvent('error', { detail })));
     second.addEventListener('sample', ({ detail }) => this.label('b', second, detail.count));
@@ -60,12 +62,21 @@ export class Compare {
     this.part(50);
     this.divider.hidden = false;
     byId('labels', HTMLElement).hidden = false;
-    await second.showAs(first).catch(() => undefined);
+    this.follow();
+    await this.following;
     if (first.paused) second.pause();
     this.changed();
   }
 
+  /** Shows the settings of a query in the second picture, which is opened if there is none. */
+  async show(query: string): Promise<void> {
+    if (!this.second) return this.open(query);
+    await this.following;
+    await this.second?.show({ ...this.second.settings, ...own(readQuery(query).state) }).catch(() => undefined);
+  }
+
   close(): void {
+    if (!this.second) return;
     this.first.removeEventListener('sample', this.labelFirst);
     this.second?.dispose();
     this.second = undefined;
@@ -85,6 +96,10 @@ export class Compare {
   private label(side: 'a' | 'b', { settings }: RestirViewer, frames: number): void {
     const view = settings.view === 'radiance' ? '' : `, ${settings.view}`;
     byId(`label-${side}`, HTMLElement).textContent = `${side.toUpperCase()}: ${settings.technique}${view}, ${frames} ${frames === 1 ? 'frame' : 'frames'}`;
+  }
+
+  private follow(): void {
+    if (this.second) this.following = this.second.showAs(this.first).catch(() => undefined);
   }
 
   private part(share: number): void {
@@ -109,6 +124,6 @@ export class Compare {
       frames: () => second.setMaxSamples(frames),
       size: () => second.setSize(size),
     };
-    void shared[name]?.();
+    for (const each of name === 'settings' ? Object.keys(shared) : [name]) void shared[each]?.();
   }
 }

@@ -97,8 +97,8 @@ export interface LoadOptions {
   time?: number;
 }
 
-/** How a scene is seen when it opens. */
-type View = Omit<LoadOptions, 'environment' | 'choice'>;
+/** How a scene is seen when it opens; with `values`, all settings. */
+type View = Partial<Settings>;
 
 const noContents: Contents = { scenes: [], scene: 0, variants: [] };
 /** So many losses within so many milliseconds, and the viewer gives up. */
@@ -198,6 +198,35 @@ export class RestirViewer extends EventTarget {
       if (source.kind === 'builtin') return;
       const view = choice.scene === undefined ? this.wanted?.view : {};
       await this.open({ ...source, choice: { ...source.choice, ...choice } }, this.surroundingsFor(undefined), view);
+    });
+  }
+
+  /**
+   * Shows the picture of all these settings, as a link to it would; a scene is loaded only where another one is shown. `files` are
+   * those of a former `scene`, for a picture of files of the user's. What is not taken is reported, and its default used instead.
+   */
+  show(settings: Settings, files?: Pick<Scene, 'source' | 'surroundings'>): Promise<void> {
+    return this.reported(async () => {
+      // What is loaded only now is not wanted any more.
+      const settled = this.loader.busy || !this.wanted;
+      this.loader.cancel();
+      const all = { ...settings, values: new Map(settings.values) };
+      if (settled && this.isOf(settings, files)) {
+        await this.loop.change((viewer) => {
+          this.forgetValues(viewer);
+          Object.assign(this.settings, all);
+          this.takeSettings(viewer);
+          this.takeView(viewer);
+        });
+      } else {
+        const { scene, sceneIndex, variant, environment } = settings;
+        const source = files?.source ?? sourceOf(scene ?? '');
+        const choice = { ...(sceneIndex !== undefined && { scene: sceneIndex }), ...(variant !== undefined && { variant }) };
+        if (!files && source.kind !== 'builtin') source.choice = choice;
+        await this.open(source, files ? files.surroundings : this.surroundingsFor(environment ?? null), all);
+      }
+      this.emit('camera-change', this.camera());
+      this.emit('param-change', { name: 'settings', value: undefined });
     });
   }
 
@@ -581,15 +610,15 @@ export class RestirViewer extends EventTarget {
     if (this.ended) throw disposed();
     const wanted = (this.wanted = { source, surroundings, view });
     try {
-      await this.show(source, surroundings, view);
+      await this.loadAndPresent(source, surroundings, view);
     } finally {
       if (this.wanted === wanted) this.wanted = undefined;
     }
     if (this.shown) this.emit('load', this.shown);
   }
 
-  private async show(source: SceneSource, surroundings: Surroundings | undefined, view: View | undefined): Promise<void> {
-    const { lights, seed } = this.settings;
+  private async loadAndPresent(source: SceneSource, surroundings: Surroundings | undefined, view: View | undefined): Promise<void> {
+    const { lights, seed } = { ...this.settings, ...view };
     const progress = (fraction: number, what: string) => this.emit('progress', { fraction, what });
     progress(0, 'Loading');
     // All that can start at once does: the wasm module, the adapter, the worker.
@@ -634,10 +663,12 @@ export class RestirViewer extends EventTarget {
 
   private async replaceScene(viewer: Viewer, flat: Uint8Array, view: View | undefined, take: (viewer: Viewer) => void): Promise<void> {
     await viewer.load(flat);
+    if (view?.values) this.forgetValues(viewer);
     // What runs goes on from where it is.
     if (view) Object.assign(this.settings, { camera: '0', pose: undefined, time: 0, animation: '0' }, view);
     else if (!this.accumulating) this.settings.time = this.moment;
     take(viewer);
+    if (view?.values) this.takeSettings(viewer);
     this.takeView(viewer);
   }
 
@@ -682,9 +713,28 @@ export class RestirViewer extends EventTarget {
     }
   }
 
-  /** Gives a new viewer all settings, and keeps their values as the viewer writes them. */
+  /** Whether the scene of these settings is shown. */
+  private isOf(wanted: Settings, files: Pick<Scene, 'source' | 'surroundings'> | undefined): boolean {
+    const { shown, settings } = this;
+    if (!shown) return false;
+    if (files) return files.source === shown.source && files.surroundings === shown.surroundings;
+    const sceneOf = ({ scene, sceneIndex, variant, environment, lights, seed }: Settings) =>
+      JSON.stringify([scene, sceneIndex, variant, environment, lights, lights && seed]);
+    return sceneOf(settings) === sceneOf(wanted);
+  }
+
+  /** Sets the film's and the renderer's parameters back to their defaults; a technique's are when it is chosen. */
+  private forgetValues(viewer: Viewer): void {
+    const { technique, values } = this.settings;
+    for (const key of values.keys()) if (key.includes('.')) viewer.set(key, String(parameterOf(technique, key)?.default));
+  }
+
+  /** Gives a viewer all settings, and keeps their values as the viewer writes them. */
   private takeSettings(viewer: Viewer): void {
     const { settings } = this;
+    this.resolution.fixedSize = settings.size;
+    this.resolution.fixedScale = settings.scale;
+    this.loop.frameLimit = settings.frames ?? Infinity;
     const standard = defaultSettings();
     this.attempt(`technique=${settings.technique}`, () => viewer.set_technique(settings.technique), () => {
       settings.technique = standard.technique;
