@@ -35,7 +35,7 @@ const button = (id: string) => byId(id, HTMLButtonElement);
 class App {
   private readonly query = readAddress(location.search);
   readonly view = new RestirViewer(byId('canvas', HTMLCanvasElement), this.query.state);
-  readonly compare = new Compare(this.view, (change) => this.showCompare(change));
+  readonly compare = new Compare(this.view, byId('canvas', HTMLCanvasElement), (change) => this.showCompare(change));
   /** Whose settings the panel shows. */
   private edited = this.view;
   private readonly time = new TimeControls({

@@ -1,10 +1,36 @@
 // A second picture over the first: the same scene, camera and moment with other settings, parted by a divider that can be moved.
-import { byId } from './notices.js';
+// A component of its own: it lies over any canvas, of the page or in an element.
 import { type Settings, readQuery, writeQuery } from './url-state.js';
 import { type Change, RestirViewer } from './viewer.js';
 
 /** What of the settings is of a picture alone; all else is shared. */
 const own = ({ technique, view, values }: Settings): Partial<Settings> => ({ technique, view, values });
+
+const css = `
+#canvas-b { pointer-events: none; clip-path: inset(0 0 0 var(--divider)); }
+#divider {
+  position: absolute;
+  top: 0;
+  bottom: 0;
+  left: calc(var(--divider) - 0.5rem);
+  width: 1rem;
+  cursor: ew-resize;
+  touch-action: none;
+  background: linear-gradient(to right, transparent 45%, var(--accent) 45% 55%, transparent 55%);
+}
+#divider:focus-visible { outline: 2px solid var(--accent); outline-offset: 1px; }
+#labels { position: absolute; inset: 0.5rem auto auto 0.5rem; margin: 0; padding: 0; display: flex; flex-wrap: wrap; gap: 0.5rem; pointer-events: none; background: none; }
+#labels span { padding: 0.15rem 0.5rem; background: var(--surface); border-radius: 6px; }
+`;
+
+const sheet = new CSSStyleSheet();
+sheet.replaceSync(css);
+
+function make<Tag extends keyof HTMLElementTagNameMap>(tag: Tag, attributes: Record<string, string>): HTMLElementTagNameMap[Tag] {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  return element;
+}
 
 export class Compare {
   private second: RestirViewer | undefined;
@@ -12,17 +38,30 @@ export class Compare {
   private following: Promise<void> = Promise.resolve();
   /** Percent of the width that shows the first picture. */
   private share = 50;
-  private readonly divider = byId('divider', HTMLElement);
+  private readonly divider = make('div', {
+    id: 'divider', part: 'divider', role: 'slider', tabindex: '0', 'aria-label': 'Divider: how much of the width shows picture A', 'aria-valuemin': '0', 'aria-valuemax': '100',
+  });
+  private readonly labels = make('div', { id: 'labels', part: 'labels' });
+  private readonly names = { a: make('span', { id: 'label-a' }), b: make('span', { id: 'label-b' }) };
+  private canvas: HTMLCanvasElement | undefined;
 
   constructor(
     private readonly first: RestirViewer,
+    /** The first picture's. The second one comes over it, as large. */
+    private readonly under: HTMLCanvasElement,
     /** A setting of the second picture's has changed, or it has come or gone. */
-    private readonly changed: (change?: Change) => void,
+    private readonly changed: (change?: Change) => void = () => undefined,
   ) {
-    const { divider } = this;
+    const { divider, labels, names } = this;
+    labels.append(names.a, names.b);
+    divider.hidden = labels.hidden = true;
+    under.after(divider, labels);
+    const { adoptedStyleSheets } = this.tree;
+    if (!adoptedStyleSheets.includes(sheet)) this.tree.adoptedStyleSheets = [...adoptedStyleSheets, sheet];
     divider.addEventListener('pointerdown', (event) => divider.setPointerCapture(event.pointerId));
     divider.addEventListener('pointermove', (event) => {
-      if (divider.hasPointerCapture(event.pointerId)) this.part((100 * event.clientX) / innerWidth);
+      const { left, width } = under.getBoundingClientRect();
+      if (divider.hasPointerCapture(event.pointerId)) this.part((100 * (event.clientX - left)) / width);
     });
     divider.addEventListener('keydown', (event) => {
       const to = { ArrowLeft: this.share - 2, ArrowRight: this.share + 2, Home: 0, End: 100 }[event.key];
@@ -33,6 +72,7 @@ export class Compare {
     first.addEventListener('camera-change', ({ detail }) => void this.second?.setCamera(detail));
     first.addEventListener('load', () => this.follow());
     first.addEventListener('param-change', ({ detail }) => this.pass(detail.name));
+    first.addEventListener('sample', ({ detail }) => this.second && this.label('a', first, detail.count));
   }
 
   /** The second picture's viewer, while there is one. */
@@ -45,23 +85,21 @@ export class Compare {
     return this.second && writeQuery({ ...readQuery('').state, ...own(this.second.settings) }).replace(/^\?/, '');
   }
 
-  /** Opens the second picture, with the settings of a query or those of the first. */
+  /** Opens the second picture, with the settings of a query or those of the first; as soon as there is a first. */
   async open(query?: string): Promise<void> {
     if (this.second) return;
     const { first } = this;
     const given = query === undefined ? own({ ...first.settings, values: new Map(first.settings.values) }) : own(readQuery(query).state);
-    const canvas = document.createElement('canvas');
-    Object.assign(canvas, { id: 'canvas-b', ariaHidden: 'true' });
-    byId('canvas', HTMLCanvasElement).after(canvas);
+    const canvas = (this.canvas = make('canvas', { id: 'canvas-b', part: 'canvas', 'aria-hidden': 'true' }));
+    this.under.after(canvas);
+    this.divider.hidden = this.labels.hidden = false;
     const second = (this.second = new RestirViewer(canvas, { ...first.settings, ...given }));
+    second.suspended = first.suspended;
     second.addEventListener('param-change', ({ detail }) => this.changed(detail));
     // A fault of the second's is told as the first's are.
     second.addEventListener('error', ({ detail }) => first.dispatchEvent(new CustomEvent('error', { detail })));
     second.addEventListener('sample', ({ detail }) => this.label('b', second, detail.count));
-    first.addEventListener('sample', this.labelFirst);
     this.part(50);
-    this.divider.hidden = false;
-    byId('labels', HTMLElement).hidden = false;
     this.follow();
     await this.following;
     if (first.paused) second.pause();
@@ -72,18 +110,26 @@ export class Compare {
   async show(query: string): Promise<void> {
     if (!this.second) return this.open(query);
     await this.following;
-    await this.second?.show({ ...this.second.settings, ...own(readQuery(query).state) }).catch(() => undefined);
+    const { second } = this;
+    const given = own(readQuery(query).state);
+    // Without a scene, it begins with them.
+    if (!second?.scene) return void (second && Object.assign(second.settings, given));
+    await second.show({ ...second.settings, ...given }).catch(() => undefined);
   }
 
   close(): void {
     if (!this.second) return;
-    this.first.removeEventListener('sample', this.labelFirst);
-    this.second?.dispose();
+    this.second.dispose();
     this.second = undefined;
-    document.getElementById('canvas-b')?.remove();
-    this.divider.hidden = true;
-    byId('labels', HTMLElement).hidden = true;
+    this.canvas?.remove();
+    this.divider.hidden = this.labels.hidden = true;
     this.changed();
+  }
+
+  /** Closes it, and takes away what it put over the first picture. */
+  dispose(): void {
+    this.close();
+    for (const element of [this.divider, this.labels]) element.remove();
   }
 
   /** Shows the other picture alone, or both again. */
@@ -91,21 +137,26 @@ export class Compare {
     this.part(this.share === 100 ? 0 : this.share === 0 ? 50 : 100);
   }
 
-  private readonly labelFirst = (event: Event) => this.label('a', this.first, (event as CustomEvent<{ count: number }>).detail.count);
+  /** What the elements are in: the page, or an element's shadow. */
+  private get tree(): Document | ShadowRoot {
+    const tree = this.under.getRootNode();
+    return tree instanceof ShadowRoot ? tree : document;
+  }
 
   private label(side: 'a' | 'b', { settings }: RestirViewer, frames: number): void {
     const view = settings.view === 'radiance' ? '' : `, ${settings.view}`;
-    byId(`label-${side}`, HTMLElement).textContent = `${side.toUpperCase()}: ${settings.technique}${view}, ${frames} ${frames === 1 ? 'frame' : 'frames'}`;
+    this.names[side].textContent = `${side.toUpperCase()}: ${settings.technique}${view}, ${frames} ${frames === 1 ? 'frame' : 'frames'}`;
   }
 
   private follow(): void {
-    if (this.second) this.following = this.second.showAs(this.first).catch(() => undefined);
+    if (this.second && this.first.scene) this.following = this.second.showAs(this.first).catch(() => undefined);
   }
 
   private part(share: number): void {
     this.share = Math.min(Math.max(share, 0), 100);
-    const { style } = document.documentElement;
-    style.setProperty('--divider', `${this.share}%`);
+    const { tree } = this;
+    const holder = tree instanceof ShadowRoot ? (tree.host as HTMLElement) : tree.documentElement;
+    holder.style.setProperty('--divider', `${this.share}%`);
     this.divider.setAttribute('aria-valuenow', String(Math.round(this.share)));
   }
 

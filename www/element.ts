@@ -1,4 +1,5 @@
 // <restir-viewer>: a RestirViewer as an element, told by attributes what to show.
+import { Compare } from './compare.js';
 import { explain, toFailure } from './messages.js';
 import { defaultTechnique, poseOf } from './url-state.js';
 import { type Pose, RestirViewer, type ViewerEventMap, type ViewerFailure } from './viewer.js';
@@ -6,16 +7,16 @@ import { type Pose, RestirViewer, type ViewerEventMap, type ViewerFailure } from
 export * from './viewer.js';
 
 const css = `
-:host { display: block; position: relative; aspect-ratio: 3 / 2; overflow: hidden; background: #0c0d10; color: #e4e2dd; font: 14px/1.45 system-ui, sans-serif; }
+:host { --accent: #f0b35a; --surface: rgb(20 22 26 / 92%); display: block; position: relative; aspect-ratio: 3 / 2; overflow: hidden; background: #0c0d10; color: #e4e2dd; font: 14px/1.45 system-ui, sans-serif; }
 :host([hidden]), [hidden] { display: none !important; }
 canvas, img { position: absolute; inset: 0; width: 100%; height: 100%; object-fit: contain; }
 :host([controls]) canvas { touch-action: none; cursor: grab; }
-canvas:focus-visible { outline: 2px solid #f0b35a; outline-offset: -2px; }
-progress { position: absolute; inset: auto 0 0; width: 100%; height: 3px; appearance: none; border: 0; background: none; color: #f0b35a; }
+canvas:focus-visible { outline: 2px solid var(--accent); outline-offset: -2px; }
+progress { position: absolute; inset: auto 0 0; width: 100%; height: 3px; appearance: none; border: 0; background: none; color: var(--accent); }
 progress::-webkit-progress-bar { background: none; }
-progress::-webkit-progress-value { background: #f0b35a; }
-progress::-moz-progress-bar { background: #f0b35a; }
-p { position: absolute; inset: auto 0.5rem 0.5rem; margin: 0; padding: 0.5rem 0.75rem; border-radius: 6px; background: rgb(20 22 26 / 92%); }
+progress::-webkit-progress-value { background: var(--accent); }
+progress::-moz-progress-bar { background: var(--accent); }
+p { position: absolute; inset: auto 0.5rem 0.5rem; margin: 0; padding: 0.5rem 0.75rem; border-radius: 6px; background: var(--surface); }
 `;
 
 /** The events that the element passes on. */
@@ -54,13 +55,14 @@ export interface RestirViewerElement {
 
 /**
  * Attributes, all live: `src`, `technique`, `params`, `camera`, `environment`, `poster`, `alt`, `controls`, `autoplay`, `time`,
- * `seed`, `scale`, `max-samples`, `view`. Events are those of `RestirViewer`; they do not bubble. It loads when it first comes into
+ * `seed`, `scale`, `max-samples`, `view`, `compare`. Events are those of `RestirViewer`; they do not bubble. It loads when it first comes into
  * view, renders while it is in view, and ends when it is removed. Style it from outside by its parts: `canvas`, `poster`,
  * `progress`, `message`.
  */
 export class RestirViewerElement extends HTMLElement {
   static readonly observedAttributes = [
     'src', 'environment', 'camera', 'time', 'technique', 'params', 'view', 'seed', 'autoplay', 'scale', 'max-samples', 'controls', 'poster', 'alt',
+    'compare',
   ];
 
   private readonly root = this.attachShadow({ mode: 'open' });
@@ -70,6 +72,7 @@ export class RestirViewerElement extends HTMLElement {
   private readonly sight = new IntersectionObserver((entries) => this.seen(entries.at(-1)?.isIntersecting ?? false));
   private canvas: HTMLCanvasElement | undefined;
   private current: RestirViewer | undefined;
+  private compare: Compare | undefined;
   /** Values of attributes as they were applied. */
   private readonly applied = new Map<string, string | null>();
   private parameters = new Map<string, string>();
@@ -93,12 +96,18 @@ export class RestirViewerElement extends HTMLElement {
     return this.current;
   }
 
+  /** The viewer of the second picture, while `compare` shows one. */
+  get second(): RestirViewer | undefined {
+    return this.compare?.other;
+  }
+
   connectedCallback(): void {
     if (this.current) return;
     this.canvas = document.createElement('canvas');
     this.canvas.part.add('canvas');
     this.root.prepend(this.canvas);
     this.current = new RestirViewer(this.canvas);
+    this.compare = new Compare(this.current, this.canvas);
     this.listen(this.current);
     this.applied.clear();
     this.parameters.clear();
@@ -112,6 +121,7 @@ export class RestirViewerElement extends HTMLElement {
     queueMicrotask(() => {
       if (this.isConnected) return;
       this.sight.disconnect();
+      this.compare?.dispose();
       this.current?.dispose();
       this.current = undefined;
       this.canvas?.remove();
@@ -152,7 +162,7 @@ export class RestirViewerElement extends HTMLElement {
 
   private seen(isSeen: boolean): void {
     if (!this.current) return;
-    this.current.suspended = !isSeen;
+    for (const viewer of [this.current, this.second]) if (viewer) viewer.suspended = !isSeen;
     if (isSeen && !this.wasSeen) {
       this.wasSeen = true;
       this.update();
@@ -239,6 +249,11 @@ export class RestirViewerElement extends HTMLElement {
     if (this.changed('scale')) void viewer.setScale(numberOf(text('scale')));
     if (this.changed('max-samples')) void viewer.setMaxSamples(numberOf(text('max-samples')));
     if (this.changed('params')) this.applyParameters(viewer);
+    if (this.changed('compare')) {
+      const second = text('compare');
+      if (second === null) this.compare?.close();
+      else void this.compare?.show(second);
+    }
   }
 
   private applyParameters(viewer: RestirViewer): void {
