@@ -29,6 +29,13 @@ const scales: [string, string][] = [
   ['1', 'full'],
 ];
 
+const budgets: [string, string][] = [
+  ['16', '16 ms a frame'],
+  ['33', '33 ms'],
+  ['', '100 ms'],
+  ['250', '250 ms'],
+];
+
 const menu = (id: string) => byId(id, HTMLSelectElement);
 const button = (id: string) => byId(id, HTMLButtonElement);
 
@@ -244,6 +251,7 @@ class App {
     this.showPresets();
     fillMenu(menu('view'), (technique?.views ?? []).map((name) => [name, name]), settings.view);
     fillMenu(menu('scale'), scales, String(settings.scale ?? ''));
+    this.showBudget();
     const summary = byId('summary', HTMLElement);
     summary.textContent = technique?.summary ?? '';
     if (technique && !technique.unbiased) {
@@ -251,6 +259,12 @@ class App {
     }
     showPanel(byId('panel', HTMLElement), this.groups(), settings.values, (key, value) => this.setParam(key, value));
     filterPanel(byId('panel', HTMLElement), byId('search', HTMLInputElement).value);
+  }
+
+  private showBudget(): void {
+    const { budget, scale, size } = this.view.settings;
+    fillMenu(menu('budget'), budgets, String(budget ?? ''));
+    menu('budget').disabled = scale !== undefined || size !== undefined;
   }
 
   private scenes(): [string, string][] {
@@ -292,6 +306,8 @@ class App {
     button('compare').addEventListener('click', () => (this.compare.other ? this.compare.close() : void this.openCompare()));
     menu('camera').addEventListener('change', () => void view.setCamera(Number(menu('camera').value)));
     menu('scale').addEventListener('change', () => void view.setScale(Number(menu('scale').value) || undefined));
+    menu('budget').addEventListener('change', () => void view.setBudget(Number(menu('budget').value) || undefined));
+    view.addEventListener('param-change', ({ detail }) => ['scale', 'size'].includes(detail.name) && this.showBudget());
     const accumulate = byId('accumulate', HTMLInputElement);
     accumulate.addEventListener('change', () => this.setAccumulate(accumulate.checked));
     menu('navigation').addEventListener('change', () => (view.controls = menu('navigation').value === 'fly' ? 'fly' : 'orbit'));

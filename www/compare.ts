@@ -69,7 +69,7 @@ export class Compare {
       event.preventDefault();
       this.part(to);
     });
-    first.addEventListener('camera-change', ({ detail }) => void this.second?.setCamera(detail));
+    first.addEventListener('camera-change', ({ detail }) => void this.second?.setCamera(detail, { moving: true }));
     first.addEventListener('load', () => this.follow());
     first.addEventListener('param-change', ({ detail }) => this.pass(detail.name));
     first.addEventListener('sample', ({ detail }) => this.second && this.label('a', first, detail.count));
@@ -164,7 +164,7 @@ export class Compare {
   private pass(name: string): void {
     const { first, second } = this;
     if (!second) return;
-    const { seed, time, speed, animation, accumulate, scale, frames, size } = first.settings;
+    const { seed, time, speed, animation, accumulate, scale, budget, frames, size } = first.settings;
     const shared: Record<string, () => Promise<void>> = {
       seed: () => second.setSeed(seed),
       time: () => second.setTime(time),
@@ -172,6 +172,7 @@ export class Compare {
       animation: () => second.setAnimation(animation),
       accumulate: () => second.setAccumulate(accumulate),
       scale: () => second.setScale(scale),
+      budget: () => second.setBudget(budget),
       frames: () => second.setMaxSamples(frames),
       size: () => second.setSize(size),
     };

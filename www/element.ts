@@ -55,14 +55,14 @@ export interface RestirViewerElement {
 
 /**
  * Attributes, all live: `src`, `technique`, `params`, `camera`, `environment`, `poster`, `alt`, `controls`, `autoplay`, `time`,
- * `seed`, `scale`, `max-samples`, `view`, `compare`. Events are those of `RestirViewer`; they do not bubble. It loads when it first comes into
+ * `seed`, `scale`, `budget`, `max-samples`, `view`, `compare`. Events are those of `RestirViewer`; they do not bubble. It loads when it first comes into
  * view, renders while it is in view, and ends when it is removed. Style it from outside by its parts: `canvas`, `poster`,
  * `progress`, `message`.
  */
 export class RestirViewerElement extends HTMLElement {
   static readonly observedAttributes = [
     'src', 'environment', 'camera', 'time', 'technique', 'params', 'view', 'seed', 'autoplay', 'scale', 'max-samples', 'controls', 'poster', 'alt',
-    'compare',
+    'compare', 'budget',
   ];
 
   private readonly root = this.attachShadow({ mode: 'open' });
@@ -247,6 +247,7 @@ export class RestirViewerElement extends HTMLElement {
     if (this.changed('seed')) void viewer.setSeed(numberOf(text('seed')) ?? 0);
     if (this.changed('autoplay')) void viewer.setAccumulate(text('autoplay') === null ? true : undefined);
     if (this.changed('scale')) void viewer.setScale(numberOf(text('scale')));
+    if (this.changed('budget')) void viewer.setBudget(numberOf(text('budget')));
     if (this.changed('max-samples')) void viewer.setMaxSamples(numberOf(text('max-samples')));
     if (this.changed('params')) this.applyParameters(viewer);
     if (this.changed('compare')) {

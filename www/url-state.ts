@@ -35,6 +35,8 @@ export interface Settings {
   size: [number, number] | undefined;
   /** Rendered pixels per device pixel, along one side; undefined adapts. */
   scale: number | undefined;
+  /** Milliseconds that a frame may take where the scale adapts; undefined is 100. */
+  budget: number | undefined;
   /** Accumulated frames after which to stop. */
   frames: number | undefined;
   /** Parameters that differ from their defaults. */
@@ -58,6 +60,7 @@ export const defaultSettings = (): Settings => ({
   pose: undefined,
   size: undefined,
   scale: undefined,
+  budget: undefined,
   frames: undefined,
   values: new Map(),
 });
@@ -77,6 +80,12 @@ function size(text: string): [number, number] {
 function scale(text: string): number {
   const value = Number(text);
   if (!(value >= 0.1 && value <= 2)) throw new Error('must be from 0.1 to 2');
+  return value;
+}
+
+function budget(text: string): number {
+  const value = Number(text);
+  if (!(value >= 1 && value <= 10_000)) throw new Error('must be from 1 to 10000 milliseconds');
   return value;
 }
 
@@ -120,6 +129,7 @@ const readers: Record<string, (state: Settings, text: string) => void> = {
   pose: (state, text) => (state.pose = poseOf(text)),
   size: (state, text) => (state.size = size(text)),
   scale: (state, text) => (state.scale = scale(text)),
+  budget: (state, text) => (state.budget = budget(text)),
   frames: (state, text) => (state.frames = integer(text, 1, 0xffffffff)),
 };
 
@@ -162,6 +172,7 @@ export function writeQuery(state: Settings): string {
   put('pose', state.pose && poseText(state.pose), undefined);
   put('size', state.size?.join('x'), undefined);
   put('scale', state.scale, undefined);
+  put('budget', state.budget, undefined);
   put('frames', state.frames, undefined);
   for (const [key, value] of state.values) query.set(key, value);
   // These need no escape in a query, and links are read by people.

@@ -4,13 +4,14 @@ import type { Camera, Description, Errors, Failure, Pose, SceneReport, Stats } f
 import { OrbitCamera } from './camera.js';
 import { Controls } from './controls.js';
 import { description, isDefault, normalised, parameterOf, techniqueOf } from './description.js';
+import { Fade } from './fade.js';
 import { readDropped, sourceOf, surroundingsOf } from './files.js';
 import { SceneLoader } from './loader.js';
 import { RestirError, toFailure } from './messages.js';
 import { Viewer } from './pkg/restir.js';
 import type { Choice, Contents, SceneSource, Surroundings } from './protocol.js';
 import { RenderLoop } from './render-loop.js';
-import { Resolution, longestSide } from './resolution.js';
+import { Resolution, defaultBudget, longestSide } from './resolution.js';
 import { type Settings, defaultSettings, writeQuery } from './url-state.js';
 import { compileWasm, startWasm } from './wasm.js';
 
@@ -124,6 +125,7 @@ export class RestirViewer extends EventTarget {
   private readonly loader = new SceneLoader();
   private readonly orbit = new OrbitCamera();
   private readonly resolution: Resolution;
+  private readonly fade: Fade;
   private readonly loop = new RenderLoop({
     beforeFrame: (viewer, seconds) => this.beforeFrame(viewer, seconds),
     afterFrame: (viewer, milliseconds) => this.afterFrame(viewer, milliseconds),
@@ -151,9 +153,8 @@ export class RestirViewer extends EventTarget {
     super();
     this.settings = { ...defaultSettings(), ...settings, values: new Map(settings.values) };
     this.resolution = new Resolution(canvas);
-    this.resolution.fixedSize = this.settings.size;
-    this.resolution.fixedScale = this.settings.scale;
-    this.loop.frameLimit = this.settings.frames ?? Infinity;
+    this.fade = new Fade(canvas);
+    this.takeLimits();
   }
 
   /** All techniques, parameters and built-in scenes. */
@@ -322,10 +323,14 @@ export class RestirViewer extends EventTarget {
     });
   }
 
-  /** Goes to one of the scene's cameras, by index or name, or to where a pose says. Rejects with `UNKNOWN_NAME` or `BAD_VALUE`. */
-  setCamera(camera: string | number | Pose): Promise<void> {
+  /**
+   * Goes to one of the scene's cameras, by index or name, or to where a pose says; `moving` on the way, where frames shall come in time
+   * rather than sharp. Rejects with `UNKNOWN_NAME` or `BAD_VALUE`.
+   */
+  setCamera(camera: string | number | Pose, { moving = false } = {}): Promise<void> {
     return this.reported(() =>
       this.loop.change((viewer) => {
+        if (moving) this.resolution.move();
         if (typeof camera === 'object') this.takePose(viewer, camera);
         else this.followCamera(viewer, String(camera));
         this.emit('camera-change', this.camera());
@@ -392,6 +397,16 @@ export class RestirViewer extends EventTarget {
       if (scale !== undefined) checkRange('scale', scale, 0.1, 2);
       this.settings.scale = this.resolution.fixedScale = scale;
       this.emit('param-change', { name: 'scale', value: scale });
+    });
+  }
+
+  /** Milliseconds, 1 to 10000, that a frame may take where the scale adapts; undefined is 100. */
+  setBudget(milliseconds: number | undefined): Promise<void> {
+    return this.reported(async () => {
+      if (milliseconds !== undefined) checkRange('budget', milliseconds, 1, 10_000);
+      this.settings.budget = milliseconds;
+      this.resolution.budget = milliseconds ?? defaultBudget;
+      this.emit('param-change', { name: 'budget', value: milliseconds });
     });
   }
 
@@ -542,6 +557,7 @@ export class RestirViewer extends EventTarget {
     this.controls = 'none';
     this.loader.cancel();
     this.flat = undefined;
+    this.fade.end();
     void this.loop.end(disposed()).then(() => this.inTurn(async () => this.freeViewer()));
   }
 
@@ -729,12 +745,16 @@ export class RestirViewer extends EventTarget {
     for (const key of values.keys()) if (key.includes('.')) viewer.set(key, String(parameterOf(technique, key)?.default));
   }
 
+  private takeLimits(): void {
+    const { size, scale, budget, frames } = this.settings;
+    Object.assign(this.resolution, { fixedSize: size, fixedScale: scale, budget: budget ?? defaultBudget });
+    this.loop.frameLimit = frames ?? Infinity;
+  }
+
   /** Gives a viewer all settings, and keeps their values as the viewer writes them. */
   private takeSettings(viewer: Viewer): void {
     const { settings } = this;
-    this.resolution.fixedSize = settings.size;
-    this.resolution.fixedScale = settings.scale;
-    this.loop.frameLimit = settings.frames ?? Infinity;
+    this.takeLimits();
     const standard = defaultSettings();
     this.attempt(`technique=${settings.technique}`, () => viewer.set_technique(settings.technique), () => {
       settings.technique = standard.technique;
@@ -801,6 +821,8 @@ export class RestirViewer extends EventTarget {
   private beforeFrame(viewer: Viewer, seconds: number): boolean {
     const moved = this.input?.controls.update(seconds) ?? false;
     if (moved) {
+      this.resolution.move();
+      this.fade.end();
       const camera = this.camera();
       viewer.set_camera(JSON.stringify(camera));
       this.settings.pose = camera;
@@ -809,14 +831,24 @@ export class RestirViewer extends EventTarget {
     const [width, height] = this.resolution.size();
     const resized = width !== this.rendered[0] || height !== this.rendered[1];
     if (resized) {
+      this.cover(viewer, width);
       viewer.resize(width, height);
       this.rendered = [width, height];
     }
     return moved || resized;
   }
 
+  /** Keeps the picture above the canvas where a sharper one is about to be rendered. */
+  private cover(viewer: Viewer, width: number): void {
+    this.fade.end();
+    if (!this.resolution.adapts || width <= this.rendered[0] || viewer.frames() === 0) return;
+    viewer.present();
+    this.fade.keep();
+  }
+
   private afterFrame(viewer: Viewer, milliseconds: number): void {
     this.resolution.observe(milliseconds);
+    this.fade.begin();
     this.moment = viewer.time();
     // The user takes over from where the camera is.
     if (this.followsCamera()) this.orbit.set(JSON.parse(viewer.camera()) as Camera, viewer.bounds());
