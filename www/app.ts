@@ -3,6 +3,7 @@ import { type Address, type OwnFiles, PageAddress, readAddress } from './address
 import type { Description, SceneReport, Stats, TechniqueInfo } from './api.js';
 import { acceptDrops } from './files.js';
 import { byId, clearError, showError, showProgress, showStatus, showWarnings } from './notices.js';
+import { CameraMenu } from './camera-menu.js';
 import { commandLine } from './command.js';
 import { Compare } from './compare.js';
 import { ErrorMeter } from './error-meter.js';
@@ -43,6 +44,7 @@ class App {
   private readonly query = readAddress(location.search);
   readonly view = new RestirViewer(byId('canvas', HTMLCanvasElement), this.query.state);
   readonly compare = new Compare(this.view, byId('canvas', HTMLCanvasElement), (change) => this.showCompare(change));
+  private readonly cameras = new CameraMenu(this.view);
   /** Whose settings the panel shows. */
   private edited = this.view;
   private readonly time = new TimeControls({
@@ -141,11 +143,10 @@ class App {
   }
 
   private showScene(scene: Scene): void {
-    const { report, cameras, contents } = scene;
+    const { report, contents } = scene;
     clearError();
     showProgress(undefined);
     this.showWarnings(report);
-    fillMenu(menu('camera'), cameras.map((camera, index) => [String(index), camera.name || `camera ${index}`]), String(this.view.cameraIndex));
     this.showMenus();
     this.showSources(scene);
     this.showContents(scene.source, contents);
@@ -178,7 +179,6 @@ class App {
     this.showMenus();
     // Another scene has been shown with all that belongs to it.
     if (!view.scene || view.scene !== before) return;
-    menu('camera').value = String(view.cameraIndex);
     this.showTime(view.scene.report);
     this.showWarnings(view.scene.report);
   }
@@ -304,7 +304,6 @@ class App {
     menu('view').addEventListener('change', () => void this.edited.setView(menu('view').value));
     menu('target').addEventListener('change', () => this.edit(menu('target').value));
     button('compare').addEventListener('click', () => (this.compare.other ? this.compare.close() : void this.openCompare()));
-    menu('camera').addEventListener('change', () => void view.setCamera(Number(menu('camera').value)));
     menu('scale').addEventListener('change', () => void view.setScale(Number(menu('scale').value) || undefined));
     menu('budget').addEventListener('change', () => void view.setBudget(Number(menu('budget').value) || undefined));
     view.addEventListener('param-change', ({ detail }) => ['scale', 'size'].includes(detail.name) && this.showBudget());
@@ -342,6 +341,7 @@ class App {
     const typing = event.target instanceof Element && event.target.closest('a, button, dialog, input, select, summary');
     if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
     const buttons: Record<string, string> = { ' ': 'pause', '.': 'step', r: 'reset', c: 'compare', h: 'fold', p: 'play', '?': 'keys' };
+    if (/^[1-9]$/.test(event.key)) return this.cameras.goTo(Number(event.key));
     if (event.key === 'x') return this.compare.flip();
     const id = buttons[event.key];
     if (!id) return;
