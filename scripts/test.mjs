@@ -11,7 +11,7 @@ const lastLine = (output) => output.trim().split('\n').at(-1);
 /** Node's test runner ends with `# pass N` among its counts. */
 const nodeSummary = (output) => `${/^. pass (\d+)/m.exec(output)?.[1] ?? 0} passed`;
 
-const browserTestFiles = ['first-picture', 'page', 'panel', 'formats', 'element', 'learn', 'history', 'compare-element', 'budget', 'bookmarks'].map((name) => `tests/browser/${name}.test.mjs`);
+const browserTestFiles = ['first-picture', 'page', 'panel', 'formats', 'element', 'learn', 'history', 'compare-element', 'budget', 'bookmarks', 'recording'].map((name) => `tests/browser/${name}.test.mjs`);
 
 const browserTests = (browser, env) => async () =>
   nodeSummary(await run(['node', '--test', '--test-concurrency=1', '--test-reporter=spec', ...browserTestFiles], { env: { ...env, BROWSER: browser } }));

@@ -1,7 +1,7 @@
 // The page: joins the menus, the panel, the URL and the notices to a viewer.
 import { type Address, type OwnFiles, PageAddress, readAddress } from './address.js';
 import type { Description, SceneReport, Stats, TechniqueInfo } from './api.js';
-import { acceptDrops } from './files.js';
+import { acceptDrops, save } from './files.js';
 import { byId, clearError, showError, showProgress, showStatus, showWarnings } from './notices.js';
 import { CameraMenu } from './camera-menu.js';
 import { commandLine } from './command.js';
@@ -9,6 +9,7 @@ import { Compare } from './compare.js';
 import { ErrorMeter } from './error-meter.js';
 import { type Group, fillMenu, filterPanel, showPanel } from './panel.js';
 import type { Contents, SceneSource } from './protocol.js';
+import { Recording } from './recording.js';
 import { TimeControls } from './time.js';
 import { showTiming } from './timing.js';
 import { type Change, RestirViewer, type Sample, type Scene, type ViewerFailure } from './viewer.js';
@@ -80,6 +81,7 @@ class App {
     if (matchMedia('(max-width: 30rem)').matches) this.fold();
     this.follow();
     new ErrorMeter(view);
+    new Recording(view, this.compare, () => this.fileName());
     const opening = view.load(scene, { environment, choice });
     try {
       this.description = await RestirViewer.describe();
@@ -392,10 +394,12 @@ class App {
   private async save(): Promise<void> {
     const picture = await this.view.capture().catch(() => undefined);
     if (!picture) return;
-    const href = URL.createObjectURL(picture);
-    const name = `${(this.view.scene?.source.name ?? 'restir').replace(/[^\w.-]+/g, '-')}-${this.view.settings.technique}.png`;
-    Object.assign(document.createElement('a'), { href, download: name }).click();
-    setTimeout(() => URL.revokeObjectURL(href), 60_000);
+    save(picture, `${this.fileName()}.png`);
+  }
+
+  /** What pictures are called, without an ending. */
+  private fileName(): string {
+    return `${(this.view.scene?.source.name ?? 'restir').replace(/[^\w.-]+/g, '-')}-${this.view.settings.technique}`;
   }
 
   private link(): string {

@@ -137,6 +137,18 @@ export class Compare {
     this.part(this.share === 100 ? 0 : this.share === 0 ? 50 : 100);
   }
 
+  /** Draws the second picture, where it is seen, over the first on a 2-D canvas. */
+  async drawOn(context: CanvasRenderingContext2D): Promise<void> {
+    const { second, share } = this;
+    if (!second?.scene) return;
+    const { width, height } = context.canvas;
+    context.save();
+    context.beginPath();
+    context.rect((width * share) / 100, 0, width, height);
+    context.clip();
+    await second.drawOn(context).finally(() => context.restore());
+  }
+
   /** What the elements are in: the page, or an element's shadow. */
   private get tree(): Document | ShadowRoot {
     const tree = this.under.getRootNode();

@@ -1,4 +1,4 @@
-// Files that a person picked or dropped, to a scene to load.
+// Files that a person picked or dropped, to a scene to load; and files that are saved.
 import type { SceneSource, Surroundings } from './protocol.js';
 
 async function read(file: File): Promise<{ name: string; bytes: Uint8Array }> {
@@ -48,6 +48,13 @@ export function sceneOf(files: readonly File[]): SceneSource {
     throw { code: 'NOT_A_SCENE', message: `${names} is neither .glb, .gltf, .obj nor .restir, nor an environment map, .hdr or .exr.` };
   }
   return { kind: 'file', name: main.name, files: [...files], choice: {} };
+}
+
+/** Saves a file under a name, as a download. */
+export function save(file: Blob, name: string): void {
+  const href = URL.createObjectURL(file);
+  Object.assign(document.createElement('a'), { href, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(href), 60_000);
 }
 
 /** Calls `dropped` with what is dropped anywhere on the page; `hint` is shown while something hovers. */

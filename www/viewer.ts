@@ -492,11 +492,41 @@ export class RestirViewer extends EventTarget {
     return this.reported(async () => {
       if (type !== 'png' && type !== 'rgba') throw invalid(`${String(type)} is neither png nor rgba.`);
       const picture = await this.picture();
-      if (type === 'rgba') return picture;
-      const canvas = new OffscreenCanvas(picture.width, picture.height);
-      canvas.getContext('2d')?.putImageData(picture, 0, 0);
-      return canvas.convertToBlob({ type: 'image/png' });
+      return type === 'rgba' ? picture : pngOf(picture);
     });
+  }
+
+  /** Draws what is shown on a 2-D canvas, as large as that is. */
+  drawOn(context: CanvasRenderingContext2D): Promise<void> {
+    return this.call((viewer) => {
+      // Once more, for only what was presented in the same task can be read.
+      viewer.present();
+      context.drawImage(this.canvas, 0, 0, context.canvas.width, context.canvas.height);
+    });
+  }
+
+  /** Renders a moment of the scene, in seconds, with so many averaged frames, as a link to it would; the settings stay. As PNG. */
+  renderAt(seconds: number, frames: number): Promise<Blob> {
+    return this.reported(async () => {
+      checkRange('time', seconds, -1e9, 1e9);
+      checkRange('frames', frames, 1, 0xffffffff, true);
+      const picture = await this.call(async (viewer) => {
+        viewer.set_accumulate(true);
+        viewer.set_time(seconds);
+        viewer.reset();
+        for (let frame = 0; frame < frames; frame++) {
+          viewer.render();
+          await viewer.idle();
+        }
+        return this.read(viewer);
+      });
+      return pngOf(picture);
+    });
+  }
+
+  /** Rendered pixels, wide and high. */
+  get size(): [number, number] {
+    return [...this.rendered];
   }
 
   /** Red, green, blue and alpha, 0 to 255, of the rendered pixel at (x, y) from the top left. Rejects with `BAD_VALUE` outside. */
@@ -857,11 +887,13 @@ export class RestirViewer extends EventTarget {
   }
 
   private picture(): Promise<ImageData> {
-    return this.call(async (viewer) => {
-      const [width, height] = this.rendered;
-      const bytes = (await viewer.read_display()) as Uint8Array;
-      return new ImageData(Uint8ClampedArray.from(bytes), width, height);
-    });
+    return this.call((viewer) => this.read(viewer));
+  }
+
+  private async read(viewer: Viewer): Promise<ImageData> {
+    const [width, height] = this.rendered;
+    const bytes = (await viewer.read_display()) as Uint8Array;
+    return new ImageData(Uint8ClampedArray.from(bytes), width, height);
   }
 
   // Losses
@@ -882,6 +914,12 @@ export class RestirViewer extends EventTarget {
     this.loop.stop(new RestirError(failure));
     this.emit('error', { ...failure, stopped: true });
   }
+}
+
+function pngOf(picture: ImageData): Promise<Blob> {
+  const canvas = new OffscreenCanvas(picture.width, picture.height);
+  canvas.getContext('2d')?.putImageData(picture, 0, 0);
+  return canvas.convertToBlob({ type: 'image/png' });
 }
 
 const camerasOf = (viewer: Viewer) => JSON.parse(viewer.cameras()) as Camera[];
