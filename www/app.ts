@@ -62,6 +62,7 @@ class App {
   private description: Description | undefined;
   private stats: Stats | undefined;
   private statsTime = 0;
+  private hadScene = false;
   /** Of the last frame: rendered pixels, frames in the picture, and the scene's moment. */
   private size: [number, number] = [1280, 720];
   private frames = 0;
@@ -149,7 +150,9 @@ class App {
     clearError();
     showProgress(undefined);
     this.showWarnings(report);
-    this.showMenus();
+    // Settings of the address that were not taken are gone; later scenes leave the panel as it is.
+    if (!this.hadScene) this.showMenus();
+    this.hadScene = true;
     this.showSources(scene);
     this.showContents(scene.source, contents);
     this.showTime(report);
