@@ -1,26 +1,19 @@
-// npm run build: the wasm module and the page, as static files in dist/.
+// npm run build: the wasm modules and the page, as static files in dist/.
 import { createHash } from 'node:crypto';
 import { cpSync, existsSync, mkdirSync, readFileSync, readdirSync, renameSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { join, relative } from 'node:path';
 import { fileURLToPath } from 'node:url';
-import { brotliCompressSync } from 'node:zlib';
 import { root } from './environment.mjs';
-import { StepError, run, script, step } from './run.mjs';
+import { buildLoader, buildWasm, moduleInputs, packageOf, work } from './modules.mjs';
+import { run, script, step } from './run.mjs';
 import { setup } from './setup.mjs';
 
 /** The finished page. */
 export const dist = join(root, 'dist');
 
-const work = join(root, 'target', 'web');
-/** Where a module is put: a folder for each, for wasm-pack optimises all that lies there. */
-const packageOf = (name) => join(work, name, 'pkg');
 const staging = join(work, 'dist');
 
-/** wasm and its JavaScript glue, brotli, in KB of 1000 bytes: of the page, and of the loader that it fetches for files. */
-const sizeLimits = { page: 400, loader: 600 };
-
-const rust = ['Cargo.toml', 'Cargo.lock', 'build.rs', 'build', 'src', 'decoders', 'loader', 'shaders', 'scripts/build.mjs'];
-const page = [...rust, 'www', 'package-lock.json', 'tsconfig.json'];
+const pageInputs = [...moduleInputs, 'scripts/build.mjs', 'www', 'package-lock.json', 'tsconfig.json'];
 
 /** The command line is in no module. */
 const apart = join(root, 'src', 'bin');
@@ -41,20 +34,6 @@ function hashOf(inputs) {
   return hash.digest('hex');
 }
 
-/** Builds the module `name` of the crate in `folder`; fails where it is larger than `limit`. */
-async function buildModule(folder, name, limit) {
-  const options = ['--profile', 'web', '--target', 'web', '--mode', 'no-install', '--no-pack', '--out-name', name, '--out-dir', packageOf(name)];
-  await run(['wasm-pack', 'build', folder, ...options]);
-  const bytes = [`${name}_bg.wasm`, `${name}.js`].map((file) => brotliCompressSync(readFileSync(join(packageOf(name), file))).length);
-  const [wasm, glue] = bytes.map((length) => length / 1000);
-  const text = `wasm ${wasm.toFixed(0)} KB + glue ${glue.toFixed(0)} KB brotli, limit ${limit} KB`;
-  if (wasm + glue > limit) throw new StepError(`too large: ${text}`);
-  return text;
-}
-
-const buildWasm = () => buildModule(root, 'restir', sizeLimits.page);
-const buildLoader = () => buildModule(join(root, 'loader'), 'loader', sizeLimits.loader);
-
 async function buildPage() {
   rmSync(staging, { recursive: true, force: true });
   mkdirSync(join(staging, 'pkg'), { recursive: true });
@@ -70,15 +49,15 @@ async function buildPage() {
 }
 
 const parts = [
-  { name: 'wasm', inputs: rust, work: buildWasm },
-  { name: 'loader', inputs: rust, work: buildLoader },
-  { name: 'page', inputs: page, work: buildPage },
+  { name: 'wasm', inputs: moduleInputs, make: buildWasm },
+  { name: 'loader', inputs: moduleInputs, make: buildLoader },
+  { name: 'page', inputs: pageInputs, make: buildPage },
 ];
 
 /** Builds dist/, but for those parts of which nothing has changed since they were built. */
 export async function build() {
   let changed = !existsSync(dist);
-  for (const { name, inputs, work: make } of parts) {
+  for (const { name, inputs, make } of parts) {
     const stamp = join(work, `stamp-${name}`);
     const hash = hashOf(inputs);
     if ((name !== 'page' || !changed) && existsSync(stamp) && readFileSync(stamp, 'utf8') === hash) continue;
