@@ -1,4 +1,4 @@
-// npm run build: the wasm modules and the page, as static files in dist/.
+// npm run build: the wasm modules, the page, the tutorials and the documentation, as static files in dist/.
 import { createHash } from 'node:crypto';
 import { cpSync, existsSync, mkdirSync, readFileSync, readdirSync, renameSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { join, relative } from 'node:path';
@@ -8,12 +8,13 @@ import { buildLoader, buildWasm, moduleInputs, packageOf, work } from './modules
 import { run, script, step } from './run.mjs';
 import { setup } from './setup.mjs';
 
-/** The finished page. */
+/** The finished site. */
 export const dist = join(root, 'dist');
 
 const staging = join(work, 'dist');
 
-const pageInputs = [...moduleInputs, 'scripts/build.mjs', 'www', 'package-lock.json', 'tsconfig.json'];
+const siteInputs = ['docs', 'README.md', 'CONTRIBUTING.md', 'CHANGELOG.md', 'scripts/site.mjs', 'scripts/markdown.mjs'];
+const pageInputs = [...moduleInputs, ...siteInputs, 'scripts/build.mjs', 'www', 'package-lock.json', 'tsconfig.json'];
 
 /** The command line is in no module. */
 const apart = join(root, 'src', 'bin');
@@ -43,6 +44,9 @@ async function buildPage() {
   for (const name of ['restir', 'loader']) {
     for (const file of [`${name}.js`, `${name}.d.ts`, `${name}_bg.wasm`]) cpSync(join(packageOf(name), file), join(staging, 'pkg', file));
   }
+  // Fetched only now, for it needs packages that setup may just have installed.
+  const { buildSite } = await import('./site.mjs');
+  buildSite(staging);
   // The old page stays whole until the new one is.
   rmSync(dist, { recursive: true, force: true });
   renameSync(staging, dist);

@@ -7,6 +7,7 @@ import { StepError } from './run.mjs';
 
 const types = {
   '.css': 'text/css; charset=utf-8',
+  '.csv': 'text/csv; charset=utf-8',
   '.glb': 'model/gltf-binary',
   '.gltf': 'model/gltf+json',
   '.html': 'text/html; charset=utf-8',
@@ -15,6 +16,7 @@ const types = {
   '.png': 'image/png',
   '.svg': 'image/svg+xml',
   '.wasm': 'application/wasm',
+  '.wgsl': 'text/plain; charset=utf-8',
 };
 
 /** The file that a request names, or undefined. `base` is the path under which the folder is served. */
