@@ -13,7 +13,7 @@ export const dist = join(root, 'dist');
 
 const staging = join(work, 'dist');
 
-const siteInputs = ['docs', 'README.md', 'CONTRIBUTING.md', 'CHANGELOG.md', 'scripts/site.mjs', 'scripts/markdown.mjs'];
+const siteInputs = ['docs', 'README.md', 'CONTRIBUTING.md', 'CHANGELOG.md', 'scripts/site.mjs', 'scripts/markdown.mjs', 'scripts/api-reference.mjs'];
 const pageInputs = [...moduleInputs, ...siteInputs, 'scripts/build.mjs', 'www', 'package-lock.json', 'tsconfig.json'];
 
 /** The command line is in no module. */

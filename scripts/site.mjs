@@ -1,13 +1,14 @@
 // The documentation as pages of the site: dist/docs from docs/*.md and the files in the root, with one navigation over all.
 import { cpSync, existsSync, mkdirSync, readFileSync, readdirSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, join, posix } from 'node:path';
+import { apiReference } from './api-reference.mjs';
 import { root } from './environment.mjs';
 import { escape, render } from './markdown.mjs';
 import { StepError } from './run.mjs';
 
 /** Pages by their files in the site. Those that no group names are in the one that is said to take the rest of their folder. */
 const groups = [
-  { title: 'Use', pages: ['index.html', 'viewer.html', 'embedding.html', 'parameters.html', 'formats.html', 'changelog.html'] },
+  { title: 'Use', pages: ['index.html', 'viewer.html', 'embedding.html', 'api.html', 'parameters.html', 'formats.html', 'changelog.html'] },
   {
     title: 'Techniques',
     pages: ['restir-di', 'restir-di-decoupled', 'restir-report', 'ris', 'path-tracer', 'normals'].map((id) => `techniques/${id}.html`),
@@ -150,6 +151,8 @@ export function buildSite(folder) {
     const data = existsSync(join(root, csv)) ? `<p>All that was measured: <a href="${posix.basename(csv)}">${posix.basename(csv)}</a></p>\n` : '';
     pages.set(file, { file, html: html + data, title, sections, lead: shortened(lead), name: titles[file] ?? title });
   }
+  const { lead, ...reference } = apiReference();
+  pages.set('api.html', { file: 'api.html', name: 'API reference', lead, ...reference });
 
   // docs/ has nothing but pages, pictures and data.
   cpSync(join(root, 'docs'), join(folder, 'docs'), { recursive: true, filter: (path) => !path.endsWith('.md') });

@@ -13,6 +13,7 @@ export interface Parameter {
   choices?: string[];
 }
 
+/** One technique, and what can be set in it. */
 export interface TechniqueInfo {
   id: string;
   title: string;
@@ -26,6 +27,7 @@ export interface TechniqueInfo {
   params: Parameter[];
 }
 
+/** One built-in scene. */
 export interface SceneInfo {
   name: string;
   title: string;
@@ -55,6 +57,7 @@ export interface Description {
   scenes: SceneInfo[];
 }
 
+/** x, y, z. */
 export type Vector = [number, number, number];
 
 /** A camera as the module gives and takes it. Perspective has `vertical_fov` (radians), orthographic `half_height`. */
@@ -100,6 +103,7 @@ export interface SceneReport {
   seconds: number;
   /** Indices of cameras that move. */
   moving_cameras: number[];
+  /** Name of the graphics adapter. */
   adapter: string;
 }
 

@@ -66,7 +66,9 @@ export interface ViewerEventMap {
   sample: CustomEvent<Sample>;
   /** The camera was moved, by hand or by `setCamera`. */
   'camera-change': CustomEvent<Camera>;
+  /** Something else that determines the picture was changed. */
   'param-change': CustomEvent<Change>;
+  /** Something went wrong; the method's promise is rejected, too. */
   error: CustomEvent<ViewerFailure>;
   /** The graphics device was lost. Unless `final`, the viewer is about to build everything again. */
   devicelost: CustomEvent<{ message: string; final: boolean }>;
@@ -459,6 +461,7 @@ export class RestirViewer extends EventTarget {
     this.loop.paused = false;
   }
 
+  /** Whether it was stopped by `pause` or `step`. */
   get paused(): boolean {
     return this.loop.paused;
   }
