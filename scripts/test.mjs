@@ -35,6 +35,7 @@ function steps() {
     ['rust tests', () => rustTests(env, { whole: process.argv.includes('--whole') })],
     ['tint', async () => lastLine(await run(['node', 'scripts/tint.mjs']))],
     ['page', () => build()],
+    ['site', async () => nodeSummary(await run(['node', '--test', '--test-reporter=spec', 'tests/site.test.mjs']))],
     ['types', () => run(['tsc', '--project', '.']).then(() => undefined)],
     ['chromium', browserTests('chromium', env)],
     ['firefox', browserTests('firefox', env)],
