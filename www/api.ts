@@ -81,7 +81,7 @@ export interface Stats {
   passes: { name: string; ms: number }[];
 }
 
-/** What `Viewer.errors()` resolves to: distances of the picture from the reference, of linear radiance. */
+/** Distances of the picture from the reference, of linear radiance. */
 export interface Errors {
   mse: number;
   /** Squared error over the squared reference plus 0.01. */
@@ -90,6 +90,8 @@ export interface Errors {
   mape: number | null;
   /** Signed difference of mean luminance, a fraction; null where the reference is black. */
   bias: number | null;
+  /** Mean FLIP: 0 for equal pictures, at most 1 (Andersson et al. 2020). */
+  flip: number;
 }
 
 /** What `Viewer.info()` returns: what the renderer has, and what was left out or repaired while the scene was read. */
@@ -111,4 +113,86 @@ export interface SceneReport {
 export interface Failure {
   code: string;
   message: string;
+}
+
+/** A setting that makes the expected picture differ from the truth, as it is now. */
+export interface BiasNote {
+  /** Its key. */
+  parameter: string;
+  /** How the picture differs. */
+  why: string;
+}
+
+/** A light sample, as the inspected pixel sees it. */
+export interface NotedSample {
+  /** Index among the scene's lights. */
+  light: number;
+  /** Where on it: the same number, the same point. */
+  point: number;
+  light_kind: string;
+  /** From the surface, world space. */
+  direction: Vector;
+  /** Metres; beyond every scene for what is infinitely far away. */
+  distance: number;
+  /** p-hat: luminance of the unshadowed integrand. */
+  target_value: number;
+}
+
+/** What a pass saw: a candidate, a domain whose reservoir it joined, a neighbour that it rejected, or the reservoir that came out. */
+export interface Note {
+  kind: 'candidate' | 'domain' | 'rejected' | 'result';
+  /** `initial`, `temporal`, `spatial 1`, ... */
+  stage: string;
+  /** Which of the pixel's reservoirs. */
+  slot: number;
+  sample: NotedSample | null;
+  /** Of a domain: the pixel that its reservoir is from. */
+  pixel: [number, number] | null;
+  /** W. */
+  unbiased_contribution_weight: number;
+  /** c. */
+  confidence_weight: number;
+  /** m. */
+  mis_weight: number;
+  /** w. */
+  resampling_weight: number;
+  /** Of a result: whether its sample is lit at the pixel. */
+  is_visible: boolean;
+  /** Of a result that a pass left as it was: why. */
+  reason: string;
+}
+
+/** One pixel of the last frame; radiance is linear Rec. 709. */
+export interface Inspection {
+  pixel: [number, number];
+  surface: {
+    instance: number;
+    triangle: number;
+    position: Vector;
+    normal: Vector;
+    depth: number;
+    base_color: Vector;
+    metallic: number;
+    roughness: number;
+    emission: Vector;
+  } | null;
+  /** Of the last frame. */
+  radiance: Vector;
+  /** Of the film. */
+  mean: Vector;
+  /** In the film's pixel. */
+  samples: number;
+  notes: Note[];
+  /** Notes that there was no room for. */
+  dropped: number;
+}
+
+/** A pass of a frame that was taken apart. */
+export interface DissectedPass {
+  /** `technique/pass`. */
+  id: string;
+  /** Its source, in shaders/. */
+  file: string;
+  /** What it wrote, or what that makes, as it would be displayed. */
+  picture: ImageData | undefined;
 }

@@ -6,10 +6,13 @@ import { byId, clearError, showError, showProgress, showStatus, showWarnings } f
 import { CameraMenu } from './camera-menu.js';
 import { commandLine } from './command.js';
 import { Compare } from './compare.js';
+import { Difference } from './difference.js';
 import { ErrorMeter } from './error-meter.js';
-import { type Group, fillMenu, filterPanel, showPanel } from './panel.js';
+import { Inspector } from './inspector.js';
+import { type Group, fillMenu, filterPanel, markBiases, showPanel } from './panel.js';
 import type { Contents, SceneSource } from './protocol.js';
 import { Recording } from './recording.js';
+import { Steps } from './steps.js';
 import { TimeControls } from './time.js';
 import { showTiming } from './timing.js';
 import { type Change, RestirViewer, type Sample, type Scene, type ViewerFailure } from './viewer.js';
@@ -63,6 +66,7 @@ class App {
   private stats: Stats | undefined;
   private statsTime = 0;
   private hadScene = false;
+  private meter: ErrorMeter | undefined;
   /** Of the last frame: rendered pixels, frames in the picture, and the scene's moment. */
   private size: [number, number] = [1280, 720];
   private frames = 0;
@@ -81,7 +85,10 @@ class App {
     // On a small screen the picture comes first.
     if (matchMedia('(max-width: 30rem)').matches) this.fold();
     this.follow();
-    new ErrorMeter(view);
+    this.meter = new ErrorMeter(view);
+    new Difference(view, this.compare);
+    new Inspector(view, byId('canvas', HTMLCanvasElement));
+    new Steps(view, () => this.pause(true));
     new Recording(view, this.compare, () => this.fileName());
     const opening = view.load(scene, { environment, choice });
     try {
@@ -233,6 +240,7 @@ class App {
   private setParam(key: string, value: string | undefined): void {
     const changed = () => {
       this.showPresets();
+      void this.showBiases();
       this.showAccumulate(this.view.accumulating);
     };
     // What was refused is shown as it was.
@@ -264,6 +272,14 @@ class App {
     }
     showPanel(byId('panel', HTMLElement), this.groups(), settings.values, (key, value) => this.setParam(key, value));
     filterPanel(byId('panel', HTMLElement), byId('search', HTMLInputElement).value);
+    void this.showBiases();
+  }
+
+  /** Marks what biases the picture as it is now. */
+  private async showBiases(): Promise<void> {
+    const { edited } = this;
+    const biases = await edited.biases().catch(() => []);
+    if (edited === this.edited) markBiases(byId('panel', HTMLElement), biases);
   }
 
   private showBudget(): void {
@@ -345,7 +361,7 @@ class App {
   private shortcut(event: KeyboardEvent): void {
     const typing = event.target instanceof Element && event.target.closest('a, button, dialog, input, select, summary');
     if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
-    const buttons: Record<string, string> = { ' ': 'pause', '.': 'step', r: 'reset', c: 'compare', h: 'fold', p: 'play', '?': 'keys' };
+    const buttons: Record<string, string> = { ' ': 'pause', '.': 'step', r: 'reset', c: 'compare', h: 'fold', i: 'inspect', p: 'play', t: 'dissect', '?': 'keys' };
     if (/^[1-9]$/.test(event.key)) return this.cameras.goTo(Number(event.key));
     if (event.key === 'x') return this.compare.flip();
     const id = buttons[event.key];
@@ -371,6 +387,7 @@ class App {
     byId('target-row', HTMLElement).hidden = !other;
     button('compare').setAttribute('aria-pressed', String(other !== undefined));
     if (!other && this.edited !== this.view) this.edit('a');
+    this.meter?.compareWith(other);
     if (change) this.noteChange(change);
     else this.address.chosen();
   }

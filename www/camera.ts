@@ -40,6 +40,17 @@ export class OrbitCamera {
     this.distance = Math.max(toMiddle, this.radius * 0.05);
   }
 
+  /** Turns to a point, which becomes the pivot. */
+  focus(point: Vector): void {
+    const away = subtract(point, this.position);
+    const right = cross(normalize(away), this.up);
+    // Straight above or below, no direction is to the right.
+    if (length(right) < 1e-3) return;
+    this.forward = normalize(away);
+    this.up = normalize(cross(right, this.forward));
+    this.distance = this.clampDistance(length(away));
+  }
+
   toCamera(): Camera {
     return { position: this.position, forward: this.forward, up: this.up, ...this.lens };
   }

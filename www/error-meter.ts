@@ -1,6 +1,8 @@
 // How far the picture is from a reference that the user kept: figures, curves against frames or time, and CSV.
 import type { Errors } from './api.js';
+import type { Picture } from './measure.js';
 import { byId } from './notices.js';
+import { svgElement } from './overlay.js';
 import type { RestirViewer, Sample } from './viewer.js';
 
 /** One measurement. */
@@ -26,55 +28,49 @@ const [width, height, margin] = [320, 180, 34];
 const percent = (value: number | null, signed = false) =>
   value === null ? '–' : `${signed && value > 0 ? '+' : ''}${(100 * value).toPrecision(3)} %`;
 
-function svg(tag: string, attributes: Record<string, string | number>, text?: string): SVGElement {
-  const element = document.createElementNS('http://www.w3.org/2000/svg', tag);
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
-  if (text !== undefined) element.textContent = text;
-  return element;
-}
-
 /** Powers of ten that hold all `values`, which are above 0. */
 function decades(values: number[]): [number, number] {
   const low = Math.floor(Math.log10(Math.min(...values)));
   return [low, Math.max(Math.ceil(Math.log10(Math.max(...values))), low + 1)];
 }
 
-export class ErrorMeter {
-  private curves: Curve[] = [];
-  private kept = false;
+/** The measurements of one picture. */
+class Track {
+  curves: Curve[] = [];
   private measuring = false;
   private last = 0;
   /** Of the picture that is being made. */
   private milliseconds = 0;
   private frames = 0;
 
-  constructor(private readonly view: RestirViewer) {
-    byId('keep-reference', HTMLButtonElement).addEventListener('click', () => void this.keep());
-    byId('errors-csv', HTMLButtonElement).addEventListener('click', () => this.save());
-    byId('errors-axis', HTMLSelectElement).addEventListener('change', () => this.show());
+  constructor(
+    readonly view: RestirViewer,
+    private readonly name: string,
+    /** What it is compared with. */
+    private readonly reference: () => Picture | undefined,
+    /** Something was measured, or could not be. */
+    private readonly measured: (problem?: string) => void,
+  ) {
     view.addEventListener('sample', ({ detail }) => void this.observe(detail));
-    // From elsewhere, or of something else, the same light looks otherwise.
-    for (const event of ['camera-change', 'load'] as const) view.addEventListener(event, () => this.forget());
-    this.show();
   }
 
-  private async keep(): Promise<void> {
-    await this.view.keepReference().catch(() => undefined);
-    this.kept = true;
+  begin(): Curve {
+    const { technique, values } = this.view.settings;
+    const own = [...values].filter(([key]) => !key.startsWith('film.')).map(([key, value]) => `${key}=${value}`);
+    const curve: Curve = { name: [...(this.name ? [this.name] : []), technique, ...own].join(' '), readings: [] };
+    // What was begun and not measured is nothing.
+    this.curves = [...this.curves.filter(({ readings }) => readings.length > 0), curve].slice(-mostCurves);
+    return curve;
+  }
+
+  clear(): void {
     this.curves = [];
     this.frames = 0;
-    await this.view.reset().catch(() => undefined);
-    this.show();
-  }
-
-  private forget(): void {
-    if (!this.kept) return;
-    this.kept = false;
-    this.show('The camera or the scene has changed: keep a new reference.');
   }
 
   private async observe({ count, milliseconds, complete }: Sample): Promise<void> {
-    if (!this.kept) return;
+    const reference = this.reference();
+    if (!reference) return;
     const begins = count <= this.frames || this.curves.length === 0;
     this.milliseconds = count <= this.frames ? milliseconds : this.milliseconds + milliseconds;
     this.frames = count;
@@ -87,40 +83,86 @@ export class ErrorMeter {
     const curve = this.curves.at(-1) ?? this.begin();
     try {
       // Between two frames: of the picture that this sample is of.
-      const errors = await this.view.errors();
-      if (!this.kept) return;
+      const errors = await this.view.errors(reference);
+      if (this.reference() !== reference) return;
       // Frames that are not averaged are each a picture of their own.
       curve.readings = this.view.accumulating ? [...curve.readings, { ...reading, ...errors }] : [{ ...reading, ...errors }];
-      this.show();
+      this.measured();
     } catch (error) {
-      this.kept = false;
-      this.show((error as Error).message);
+      if (this.reference() === reference) this.measured((error as Error).message);
     } finally {
       this.measuring = false;
     }
   }
+}
 
-  private begin(): Curve {
-    const { technique, values } = this.view.settings;
-    const own = [...values].filter(([key]) => !key.startsWith('film.')).map(([key, value]) => `${key}=${value}`);
-    const curve: Curve = { name: [technique, ...own].join(' '), readings: [] };
-    // What was begun and not measured is nothing.
-    this.curves = [...this.curves.filter(({ readings }) => readings.length > 0), curve].slice(-mostCurves);
-    return curve;
+export class ErrorMeter {
+  private tracks: Track[];
+  private kept: Picture | undefined;
+
+  constructor(private readonly view: RestirViewer) {
+    this.tracks = [this.track(view, '')];
+    byId('keep-reference', HTMLButtonElement).addEventListener('click', () => void this.keep());
+    byId('errors-csv', HTMLButtonElement).addEventListener('click', () => this.save());
+    byId('errors-axis', HTMLSelectElement).addEventListener('change', () => this.show());
+    // From elsewhere, or of something else, the same light looks otherwise.
+    for (const event of ['camera-change', 'load'] as const) view.addEventListener(event, () => this.forget());
+    this.show();
+  }
+
+  /** Measures a second picture, too, or with undefined no longer. */
+  compareWith(other: RestirViewer | undefined): void {
+    const [first] = this.tracks;
+    if (!first || this.tracks[1]?.view === other) return;
+    this.tracks = other ? [first, this.track(other, 'B:')] : [first];
+    this.show();
+  }
+
+  private track(view: RestirViewer, name: string): Track {
+    const track: Track = new Track(view, name, () => (this.tracks.includes(track) ? this.kept : undefined), (problem) => {
+      if (problem !== undefined) this.kept = undefined;
+      this.show(problem);
+    });
+    return track;
+  }
+
+  private async keep(): Promise<void> {
+    await this.view.keepReference().catch(() => undefined);
+    this.kept = this.view.reference;
+    for (const track of this.tracks) track.clear();
+    await Promise.all(this.tracks.map(({ view }) => view.reset().catch(() => undefined)));
+    this.show();
+  }
+
+  private forget(): void {
+    if (!this.kept) return;
+    this.kept = undefined;
+    this.show('The camera or the scene has changed: keep a new reference.');
+  }
+
+  private get curves(): Curve[] {
+    return this.tracks.flatMap(({ curves }) => curves.slice(-Math.ceil(mostCurves / this.tracks.length)));
   }
 
   private show(words = 'Let the path tracer average many frames, keep the picture, then choose what to compare with it.'): void {
-    const readings = this.curves.at(-1)?.readings ?? [];
-    const now = readings.at(-1);
-    const cells = now && this.kept
-      ? [['MSE', now.mse.toExponential(2)], ['relative MSE', now.relmse.toExponential(2)], ['MAPE', percent(now.mape)], ['bias', percent(now.bias, true)]]
-      : [];
-    const rows = cells.map(([name = '', value = '']) => {
+    const latest = this.tracks.map(({ curves }) => curves.at(-1)?.readings.at(-1));
+    const shown = this.kept && latest.some((reading) => reading);
+    const figures: [string, (reading: Reading) => string][] = [
+      ['MSE', ({ mse }) => mse.toExponential(2)],
+      ['relative MSE', ({ relmse }) => relmse.toExponential(2)],
+      ['MAPE', ({ mape }) => percent(mape)],
+      ['FLIP', ({ flip }) => flip.toFixed(4)],
+      ['bias', ({ bias }) => percent(bias, true)],
+    ];
+    const cell = (tag: 'th' | 'td', textContent: string, scope = '') => Object.assign(document.createElement(tag), { textContent, ...(scope && { scope }) });
+    const line = (...cells: HTMLElement[]) => {
       const row = document.createElement('tr');
-      row.append(Object.assign(document.createElement('th'), { scope: 'row', textContent: name }), Object.assign(document.createElement('td'), { textContent: value }));
+      row.append(...cells);
       return row;
-    });
-    byId('errors-table', HTMLTableElement).replaceChildren(...rows);
+    };
+    const rows = figures.map(([name, value]) => line(cell('th', name, 'row'), ...latest.map((reading) => cell('td', reading ? value(reading) : '–'))));
+    const heads = latest.length > 1 ? [line(cell('td', ''), cell('th', 'A', 'col'), cell('th', 'B', 'col'))] : [];
+    byId('errors-table', HTMLTableElement).replaceChildren(...(shown ? [...heads, ...rows] : []));
     byId('errors-words', HTMLElement).textContent = this.kept ? '' : words;
     byId('errors-csv', HTMLButtonElement).disabled = this.curves.every((curve) => curve.readings.length === 0);
     this.plot();
@@ -139,21 +181,21 @@ export class ErrorMeter {
     const [y0, y1] = decades(all.map(([, y]) => y));
     const atX = (x: number) => margin + ((Math.log10(x) - x0) / (x1 - x0)) * (width - margin - 8);
     const atY = (y: number) => 6 + ((y1 - Math.log10(y)) / (y1 - y0)) * (height - margin);
-    const picture = svg('svg', { viewBox: `0 0 ${width} ${height}`, role: 'img', 'aria-label': `MSE against ${byTime ? 'time' : 'frames'}` });
+    const picture = svgElement('svg', { viewBox: `0 0 ${width} ${height}`, role: 'img', 'aria-label': `MSE against ${byTime ? 'time' : 'frames'}` });
     for (let power = x0; power <= x1; power++) {
       const x = atX(10 ** power);
-      picture.append(svg('line', { x1: x, x2: x, y1: atY(10 ** y1), y2: atY(10 ** y0), class: 'grid' }), svg('text', { x, y: height - 14, 'text-anchor': 'middle' }, `1e${power}`));
+      picture.append(svgElement('line', { x1: x, x2: x, y1: atY(10 ** y1), y2: atY(10 ** y0), class: 'grid' }), svgElement('text', { x, y: height - 14, 'text-anchor': 'middle' }, `1e${power}`));
     }
     for (let power = y0; power <= y1; power++) {
       const y = atY(10 ** power);
-      picture.append(svg('line', { x1: margin, x2: width - 8, y1: y, y2: y, class: 'grid' }), svg('text', { x: margin - 4, y: y + 3, 'text-anchor': 'end' }, `1e${power}`));
+      picture.append(svgElement('line', { x1: margin, x2: width - 8, y1: y, y2: y, class: 'grid' }), svgElement('text', { x: margin - 4, y: y + 3, 'text-anchor': 'end' }, `1e${power}`));
     }
-    picture.append(svg('text', { x: width / 2, y: height - 2, 'text-anchor': 'middle' }, byTime ? 'milliseconds' : 'frames'));
+    picture.append(svgElement('text', { x: width / 2, y: height - 2, 'text-anchor': 'middle' }, byTime ? 'milliseconds' : 'frames'));
     for (const [index, curve] of drawn.entries()) {
       const line = points(curve).map(([x, y]) => `${atX(x).toFixed(1)},${atY(y).toFixed(1)}`).join(' ');
-      picture.append(svg('polyline', { points: line, class: `curve curve-${index}` }));
+      picture.append(svgElement('polyline', { points: line, class: `curve curve-${index}` }));
       const [x, y] = points(curve).at(-1) ?? [1, 1];
-      picture.append(svg('circle', { cx: atX(x), cy: atY(y), r: 2.5, class: `curve-${index}` }));
+      picture.append(svgElement('circle', { cx: atX(x), cy: atY(y), r: 2.5, class: `curve-${index}` }));
     }
     const legend = document.createElement('ul');
     for (const [index, { name }] of drawn.entries()) {
@@ -167,9 +209,9 @@ export class ErrorMeter {
   private save(): void {
     const quoted = (text: string) => `"${text.replaceAll('"', '""')}"`;
     const lines = this.curves.flatMap(({ name, readings }) =>
-      readings.map(({ frames, milliseconds, mse, relmse, mape, bias }) => [quoted(name), frames, milliseconds.toFixed(3), mse, relmse, mape ?? '', bias ?? ''].join(',')),
+      readings.map(({ frames, milliseconds, mse, relmse, mape, bias, flip }) => [quoted(name), frames, milliseconds.toFixed(3), mse, relmse, mape ?? '', bias ?? '', flip].join(',')),
     );
-    const csv = ['series,frames,milliseconds,mse,relmse,mape,bias', ...lines, ''].join('\n');
+    const csv = ['series,frames,milliseconds,mse,relmse,mape,bias,flip', ...lines, ''].join('\n');
     const href = URL.createObjectURL(new Blob([csv], { type: 'text/csv' }));
     Object.assign(document.createElement('a'), { href, download: 'errors.csv' }).click();
     setTimeout(() => URL.revokeObjectURL(href), 60_000);

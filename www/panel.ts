@@ -1,5 +1,5 @@
 // The settings panel, generated from the parameter declarations.
-import type { Parameter } from './api.js';
+import type { BiasNote, Parameter } from './api.js';
 import { isDefault } from './description.js';
 
 export interface Group {
@@ -107,7 +107,8 @@ function row(key: string, parameter: Parameter, value: string | undefined, chang
   const doc = make('small', { id: `${id}-doc`, textContent: parameter.doc });
   for (const element of elements) element.setAttribute('aria-describedby', doc.id);
   const whole = make('div', { className: 'parameter', title: parameter.doc });
-  whole.append(label, ...elements, back, doc);
+  whole.dataset.key = key;
+  whole.append(label, ...elements, back, make('strong', { className: 'bias', hidden: true }), doc);
   return whole;
 }
 
@@ -130,4 +131,15 @@ export function showPanel(root: HTMLElement, groups: Group[], values: ReadonlyMa
     return fieldset;
   });
   root.replaceChildren(...fieldsets);
+}
+
+/** Marks those parameters whose values bias the picture. */
+export function markBiases(root: HTMLElement, biases: BiasNote[]): void {
+  for (const row of root.querySelectorAll<HTMLElement>('.parameter')) {
+    const mark = row.querySelector<HTMLElement>('.bias');
+    const found = biases.find(({ parameter }) => parameter === row.dataset.key);
+    if (!mark) continue;
+    mark.hidden = !found;
+    mark.textContent = found ? `Biased: ${found.why}.` : '';
+  }
 }

@@ -1,21 +1,24 @@
 // A scene on a canvas: loads it, renders it, moves its camera, and starts again when the device is lost. Knows no page.
 import { findAdapter } from './adapter.js';
-import type { Camera, Description, Errors, Failure, Pose, SceneReport, Stats } from './api.js';
+import type { BiasNote, Camera, Description, DissectedPass, Errors, Failure, Inspection, Pose, SceneReport, Stats } from './api.js';
 import { OrbitCamera } from './camera.js';
 import { Controls } from './controls.js';
 import { description, isDefault, normalised, parameterOf, techniqueOf } from './description.js';
 import { Fade } from './fade.js';
 import { readDropped, sourceOf, surroundingsOf } from './files.js';
+import { sharedDevice } from './device.js';
 import { SceneLoader } from './loader.js';
+import { type Picture, errorsOf } from './measure.js';
 import { RestirError, toFailure } from './messages.js';
 import { Viewer } from './pkg/restir.js';
 import type { Choice, Contents, SceneSource, Surroundings } from './protocol.js';
+import { pixelAt } from './overlay.js';
 import { RenderLoop } from './render-loop.js';
 import { Resolution, defaultBudget, longestSide } from './resolution.js';
 import { type Settings, defaultSettings, writeQuery } from './url-state.js';
 import { compileWasm, startWasm } from './wasm.js';
 
-export type { Camera, Choice, Contents, Description, Errors, Failure, Pose, SceneReport, Settings, Stats };
+export type { BiasNote, Camera, DissectedPass, Inspection, Picture, Choice, Contents, Description, Errors, Failure, Pose, SceneReport, Settings, Stats };
 export { RestirError };
 
 /** One frame. */
@@ -148,6 +151,8 @@ export class RestirViewer extends EventTarget {
   private moment = 0;
   /** When devices were lost. */
   private losses: number[] = [];
+  private kept: Picture | undefined;
+  private inspected: [number, number] | undefined;
   private ended = false;
 
   /** `settings` are those of the first scene; what it does not take is reported and dropped. `scene` is ignored: see `load`. */
@@ -340,6 +345,24 @@ export class RestirViewer extends EventTarget {
     );
   }
 
+  /** Turns the camera to what the pixel (x, y) from the top left shows, which it orbits from then on. Does nothing where there is no surface. */
+  focus(x: number, y: number): Promise<void> {
+    return this.reported(() =>
+      this.loop.change(async (viewer) => {
+        viewer.inspect(Uint32Array.of(x, y));
+        viewer.render();
+        const { surface } = JSON.parse((await viewer.inspection()) as string) as Inspection;
+        viewer.inspect(Uint32Array.from(this.isInside(this.inspected) ? this.inspected : []));
+        if (!surface) return;
+        this.orbit.focus(surface.position);
+        const camera = this.camera();
+        viewer.set_camera(JSON.stringify(camera));
+        this.settings.pose = camera;
+        this.emit('camera-change', camera);
+      }),
+    );
+  }
+
   /** The camera of the picture. */
   camera(): Camera {
     return this.orbit.toCamera();
@@ -445,6 +468,11 @@ export class RestirViewer extends EventTarget {
     if (!this.input) {
       const end = new AbortController();
       this.input = { controls: new Controls(this.canvas, this.orbit, end.signal), end };
+      const focus = ({ clientX, clientY }: MouseEvent) => {
+        const pixel = pixelAt(this.canvas, this.rendered, clientX, clientY);
+        if (pixel) void this.focus(...pixel);
+      };
+      this.canvas.addEventListener('dblclick', focus, { signal: end.signal });
     }
     this.input.controls.mode = mode;
   }
@@ -558,17 +586,68 @@ export class RestirViewer extends EventTarget {
     return this.call(async (viewer) => JSON.parse((await viewer.stats()) as string) as Stats);
   }
 
-  /** Keeps the averaged picture as the reference of `errors`, and its size in pixels from now on, for only alike ones are compared. */
+  /** The averaged picture as it is now. */
+  readPicture(): Promise<Picture> {
+    return this.call(async (viewer) => {
+      const [width, height] = this.rendered;
+      return { width, height, pixels: (await viewer.read_picture()) as Float32Array };
+    });
+  }
+
+  /** Keeps the averaged picture as `reference`, and its size in pixels from now on, for only alike ones are compared. */
   keepReference(): Promise<void> {
     return this.reported(async () => {
-      await this.call((viewer) => viewer.keep_reference());
+      this.kept = await this.readPicture();
       await this.setSize([...this.rendered]);
     });
   }
 
-  /** How far the picture is from the reference. Rejects with `BAD_VALUE` where there is none, or one of another size. */
-  errors(): Promise<Errors> {
-    return this.call(async (viewer) => JSON.parse((await viewer.errors()) as string) as Errors);
+  /** What `keepReference` kept last. */
+  get reference(): Picture | undefined {
+    return this.kept;
+  }
+
+  /** How far the picture is from a reference. Rejects with `BAD_VALUE` where there is none, or one of another size. */
+  async errors(reference = this.kept): Promise<Errors> {
+    if (!reference) throw invalid('There is no reference yet.');
+    return errorsOf(await this.readPicture(), reference);
+  }
+
+  /** Which settings, as they are now, bias the picture. */
+  biases(): Promise<BiasNote[]> {
+    return this.call((viewer) => JSON.parse(viewer.biases()) as BiasNote[]);
+  }
+
+  /** Has the passes of frames from now on observed at the pixel (x, y) from the top left; undefined ends it. Rejects with `BAD_VALUE` outside. */
+  inspect(pixel: [number, number] | undefined): Promise<void> {
+    return this.reported(() =>
+      this.call((viewer) => {
+        viewer.inspect(Uint32Array.from(pixel ?? []));
+        this.inspected = pixel;
+      }),
+    );
+  }
+
+  /** What was seen at that pixel in the last frame. */
+  inspection(): Promise<Inspection> {
+    return this.call(async (viewer) => JSON.parse((await viewer.inspection()) as string) as Inspection);
+  }
+
+  /** Renders one frame, and resolves to what each of its passes wrote. */
+  dissect(): Promise<DissectedPass[]> {
+    return this.reported(() =>
+      this.call(async (viewer) => {
+        const [width, height] = this.rendered;
+        const passes = JSON.parse(viewer.dissect()) as { id: string; file: string; has_picture: boolean }[];
+        const dissected: DissectedPass[] = [];
+        for (const [index, { id, file, has_picture: hasPicture }] of passes.entries()) {
+          const bytes = hasPicture ? ((await viewer.dissected(index)) as Uint8Array) : undefined;
+          dissected.push({ id, file, picture: bytes && new ImageData(Uint8ClampedArray.from(bytes), width, height) });
+        }
+        viewer.forget_dissection();
+        return dissected;
+      }),
+    );
   }
 
   /** Runs work on the wasm module's own viewer between two frames; for what has no method here. */
@@ -723,7 +802,7 @@ export class RestirViewer extends EventTarget {
 
   private async createViewer(flat: Uint8Array, view: View = {}, take?: (viewer: Viewer) => void): Promise<void> {
     const size = this.resolution.size();
-    const viewer = await Viewer.create(this.canvas, flat, ...size);
+    const viewer = await Viewer.create(await sharedDevice(), this.canvas, flat, ...size);
     if (this.ended) {
       viewer.free();
       throw disposed();
@@ -842,6 +921,10 @@ export class RestirViewer extends EventTarget {
     viewer.set_camera(JSON.stringify(posed));
     this.settings.pose = pose;
     this.orbit.set(posed, viewer.bounds());
+  }
+
+  private isInside(pixel: [number, number] | undefined): pixel is [number, number] {
+    return pixel !== undefined && pixel[0] < this.rendered[0] && pixel[1] < this.rendered[1];
   }
 
   /** Whether the picture is seen through a camera that moves by itself. */
