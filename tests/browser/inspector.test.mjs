@@ -9,6 +9,8 @@ after(() => site.close());
 
 async function withPage(query, work) {
   const { page, problems } = await openPage(site, query);
+  // Wide enough for what lies beside the picture: on a small screen it lies over it.
+  await page.setViewport({ width: 1280, height: 800 });
   try {
     await waitForFrames(page, 1);
     await work(page);
@@ -31,11 +33,11 @@ const rows = (page, id) =>
 test('a click on a pixel tells what the passes saw there, and the figures add up', () =>
   withPage('?scene=cornell&size=48x36&spatial_confidence_limit=1000&indirect=false', async (page) => {
     await page.click('#inspect');
-    // The floor, left of the middle: canvas and picture have one shape here, 640 by 400 shows 48 by 36 with bars left and right.
-    await page.mouse.click(260, 330);
+    // The floor, left of the middle: 1280 by 800 shows 48 by 36 with bars left and right.
+    await page.mouse.click(560, 660);
     await inspectorSays(page, 'was chosen', 'Of 32 candidates', 'neighbour', 'history');
     const where = (await text(page, 'inspector-where')).match(/\d+/g).map(Number);
-    assert.deepEqual(where, [Math.floor((260 - (640 - 400 * (48 / 36)) / 2) / (400 / 36)), Math.floor(330 / (400 / 36))]);
+    assert.deepEqual(where, [Math.floor((560 - (1280 - 800 * (48 / 36)) / 2) / (800 / 36)), Math.floor(660 / (800 / 36))]);
     const passes = await rows(page, 'reservoirs');
     assert.deepEqual(passes.map(([name]) => name), ['initial', 'temporal', 'spatial 1']);
     for (const [, , w, , target, estimate] of passes) assert.ok(Math.abs(w * target - estimate) <= 0.02 * estimate + 1e-3, `${w} * ${target} = ${estimate}`);
@@ -65,20 +67,20 @@ test('a drag while inspecting still turns the camera, and chooses no pixel', () 
   withPage('?scene=cornell&size=24x18&technique=ris', async (page) => {
     await page.click('#inspect');
     await inspectorSays(page, 'Pixel 12, 9');
-    await page.mouse.move(300, 200);
+    await page.mouse.move(600, 400);
     await page.mouse.down();
-    await page.mouse.move(360, 200, { steps: 3 });
+    await page.mouse.move(660, 400, { steps: 3 });
     await page.mouse.up();
     await page.waitForFunction(() => location.search.includes('pose='), { polling: 50 });
     assert.equal(await text(page, 'inspector-where'), 'Pixel 12, 9');
   }));
 
 test('why: the background has no surface, the light shines itself', () =>
-  withPage('?scene=veach-mis&size=40x30', async (page) => {
+  withPage('?scene=veach-mis&size=40x30&technique=normals', async (page) => {
     const pixels = await page.evaluate(async () => {
       const found = {};
-      for (let y = 0; y < 30; y += 2) {
-        for (let x = 0; x < 40; x += 2) {
+      for (let y = 0; y < 30; y += 3) {
+        for (let x = 0; x < 40; x += 3) {
           const seen = await window.restir.call(async (viewer) => {
             viewer.inspect(Uint32Array.of(x, y));
             viewer.render();
@@ -173,15 +175,15 @@ test('settings that bias are marked as they are set, contradictions with others 
   }));
 
 test('a double click turns the camera to what is there, which it then orbits', () =>
-  withPage('?scene=cornell&size=40x40&technique=normals', async (page) => {
-    const [x, y] = [240, 260];
+  withPage('?scene=cornell&size=40x40&technique=normals&render.pixel_filter=center', async (page) => {
+    const [x, y] = [500, 520];
     const expected = await page.evaluate(async (px, py) => {
       return window.restir.call(async (viewer) => {
         viewer.inspect(Uint32Array.of(px, py));
         viewer.render();
         return JSON.parse(await viewer.inspection()).surface.position;
       });
-    }, Math.floor((x - 120) / 10), Math.floor(y / 10));
+    }, Math.floor((x - 240) / 20), Math.floor(y / 20));
     await page.mouse.click(x, y, { count: 2 });
     await page.waitForFunction(() => location.search.includes('pose='), { polling: 50 });
     const { position, forward } = await page.evaluate(() => window.restir.call((viewer) => JSON.parse(viewer.camera())));
