@@ -15,6 +15,7 @@ import { Recording } from './recording.js';
 import { Steps } from './steps.js';
 import { TimeControls } from './time.js';
 import { showTiming } from './timing.js';
+import { TimingHistory } from './timing-history.js';
 import { type Change, RestirViewer, type Sample, type Scene, type ViewerFailure } from './viewer.js';
 
 const defaultScene = 'cornell';
@@ -63,6 +64,7 @@ class App {
     (address, files) => this.showAddress(address, files),
   );
   private description: Description | undefined;
+  private readonly history = new TimingHistory();
   private stats: Stats | undefined;
   private statsTime = 0;
   private hadScene = false;
@@ -465,6 +467,7 @@ class App {
       this.stats = await this.view.timings();
       show();
       showTiming(this.stats);
+      this.history.add({ ...this.stats, milliseconds });
     };
     // A frame that was not measured is no loss.
     read().catch(() => undefined);

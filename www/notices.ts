@@ -53,7 +53,8 @@ export function showWarnings(warnings: string[]): void {
   details.querySelector('ul')?.replaceChildren(...items);
 }
 
-const withUnit = (value: number): string => {
+/** A number with three digits and a letter for its size; ends with a space or that letter. */
+export const withUnit = (value: number): string => {
   for (const [size, letter] of [[1e9, 'G'], [1e6, 'M'], [1e3, 'k']] as const) if (value >= size) return `${(value / size).toPrecision(3)} ${letter}`;
   return `${Math.round(value)} `;
 };
