@@ -2,7 +2,7 @@
 import { type Address, type OwnFiles, PageAddress, readAddress } from './address.js';
 import type { Description, SceneReport, Stats, TechniqueInfo } from './api.js';
 import { acceptDrops, save } from './files.js';
-import { byId, clearError, showError, showProgress, showStatus, showWarnings } from './notices.js';
+import { byId, clearError, hideProgress, showError, showProgress, showStatus, showWarnings } from './notices.js';
 import { CameraMenu } from './camera-menu.js';
 import { commandLine } from './command.js';
 import { Compare } from './compare.js';
@@ -119,7 +119,7 @@ class App {
   /** Shows what the viewer tells. */
   private follow(): void {
     const { view } = this;
-    view.addEventListener('progress', ({ detail }) => showProgress(detail.fraction, detail.what, { cancellable: detail.fraction < 1 }));
+    view.addEventListener('progress', ({ detail }) => showProgress(detail.stage, detail.fraction, detail.what));
     view.addEventListener('load', ({ detail }) => this.showScene(detail));
     view.addEventListener('sample', ({ detail }) => this.showSample(detail));
     view.addEventListener('error', ({ detail }) => this.showFailure(detail));
@@ -147,17 +147,18 @@ class App {
 
   /** Waits for a load that the user asked for. Its failure is an event; the menus show what is there all the same. */
   private async settle(loading: Promise<void>): Promise<void> {
-    await loading.catch(() => undefined);
+    const failed = await loading.then(() => false, () => true);
     // A load that made way for another leaves the bar to that.
     if (this.view.loading) return;
-    showProgress(undefined);
+    if (failed) hideProgress();
     if (this.view.scene) this.showSources(this.view.scene);
   }
 
   private showScene(scene: Scene): void {
     const { report, contents } = scene;
     clearError();
-    showProgress(undefined);
+    // Its first frame ends it.
+    showProgress('picture', 1, 'Rendering the first picture');
     this.showWarnings(report);
     // Settings of the address that were not taken are gone; later scenes leave the panel as it is.
     if (!this.hadScene) this.showMenus();
@@ -452,6 +453,8 @@ class App {
 
   private showSample(sample: Sample): void {
     performance.mark('picture');
+    // A frame of the former scene ends no load.
+    if (!this.view.opening) hideProgress();
     this.time.showTime(sample.time);
     const { count: frames, milliseconds, width, height, complete } = sample;
     [this.size, this.frames, this.moment] = [[width, height], frames, sample.time];

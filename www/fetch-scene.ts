@@ -1,11 +1,36 @@
 // A scene file by its address, and the files that it names, which lie beside it.
 
+/** Told of bytes that have come, and of bytes that will come besides. */
+export type Received = (bytes: number, announced: number) => void;
+
+/** What a response holds, told piece by piece. */
+async function bytesOf(response: Response, received: Received): Promise<Uint8Array> {
+  if (!response.body) return new Uint8Array(await response.arrayBuffer());
+  // What is compressed on its way announces the bytes of the way.
+  const announced = response.headers.has('content-encoding') ? 0 : Number(response.headers.get('content-length') ?? 0);
+  received(0, announced);
+  const pieces: Uint8Array[] = [];
+  const reader = response.body.getReader();
+  for (let { done, value } = await reader.read(); !done; { done, value } = await reader.read()) {
+    if (!value) continue;
+    pieces.push(value);
+    received(value.length, 0);
+  }
+  const whole = new Uint8Array(pieces.reduce((sum, { length }) => sum + length, 0));
+  let at = 0;
+  for (const piece of pieces) {
+    whole.set(piece, at);
+    at += piece.length;
+  }
+  return whole;
+}
+
 /** The bytes at `address`; throws IO, with `name` and the reason. */
-export async function fetchBytes(name: string, address: string): Promise<Uint8Array> {
+export async function fetchBytes(name: string, address: string, received: Received): Promise<Uint8Array> {
   let problem: string;
   try {
     const response = await fetch(address);
-    if (response.ok) return new Uint8Array(await response.arrayBuffer());
+    if (response.ok) return await bytesOf(response, received);
     problem = `the server says ${response.status} ${response.statusText}`;
   } catch (error) {
     // A server that does not let this page read its files looks like one that is not there.
@@ -49,7 +74,7 @@ function namedBy(name: string, bytes: Uint8Array): string[] {
 }
 
 /** The file at `address` under `name`, and all that it names under the names that it uses. Throws IO. */
-export async function fetchScene(name: string, address: string): Promise<Map<string, Uint8Array>> {
+export async function fetchScene(name: string, address: string, received: Received): Promise<Map<string, Uint8Array>> {
   const files = new Map<string, Uint8Array>();
   const take = async (uri: string, url: string): Promise<void> => {
     if (files.has(decoded(uri))) return;
@@ -57,7 +82,7 @@ export async function fetchScene(name: string, address: string): Promise<Map<str
     files.set(decoded(uri), new Uint8Array());
     let bytes: Uint8Array;
     try {
-      bytes = await fetchBytes(uri, url);
+      bytes = await fetchBytes(uri, url, received);
     } catch (error) {
       // What is missing beside an OBJ is a warning, or not needed: its reader says so.
       if (!others || !/\.obj$/i.test(name)) throw error;

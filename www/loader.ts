@@ -1,7 +1,8 @@
 // Loads a scene in a worker of its own. The worker ends with the load, and its memory with it.
 import type { LoadRequest, LoadResponse, Loaded } from './protocol.js';
+import type { Stage } from './stages.js';
 
-export type Progress = (fraction: number, what: string) => void;
+export type Progress = (stage: Stage, fraction: number, what: string) => void;
 
 export class SceneLoader {
   private worker: Worker | undefined;
@@ -16,7 +17,7 @@ export class SceneLoader {
     return new Promise((resolve, reject) => {
       this.abandon = reject;
       worker.onmessage = ({ data }: MessageEvent<LoadResponse>) => {
-        if (data.kind === 'progress') return progress(data.fraction, data.what);
+        if (data.kind === 'progress') return progress(data.stage, data.fraction, data.what);
         this.end(worker);
         if (data.kind === 'scene') resolve(data);
         else reject(data.failure);

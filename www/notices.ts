@@ -1,6 +1,7 @@
 // What the page says: messages, warnings, progress and the status line.
 import type { Stats } from './api.js';
 import { explain } from './messages.js';
+import { type Stage, showStages } from './stages.js';
 
 /** The element with `id`, which index.html holds. */
 export function byId<T extends HTMLElement>(id: string, type: new () => T): T {
@@ -35,12 +36,18 @@ export function clearError(): void {
   message.hidden = true;
 }
 
-/** Shows how far a load is (0 to 1) and what it does; undefined hides the bar. */
-export function showProgress(fraction: number | undefined, what = '', { cancellable = true } = {}): void {
-  byId('cancel', HTMLButtonElement).disabled = !cancellable;
-  byId('loading', HTMLElement).hidden = fraction === undefined;
-  byId('loading-bar', HTMLProgressElement).value = fraction ?? 0;
+/** Shows a load's stage, how far it is (0 to 1) and what it does. At 1 it cannot be cancelled any more. */
+export function showProgress(stage: Stage, fraction: number, what: string): void {
+  byId('cancel', HTMLButtonElement).disabled = fraction === 1;
+  byId('loading', HTMLElement).hidden = false;
+  byId('loading-bar', HTMLProgressElement).value = fraction;
   byId('loading-text', HTMLElement).textContent = what;
+  showStages(byId('stages', HTMLOListElement), stage);
+}
+
+/** The load has ended. */
+export function hideProgress(): void {
+  byId('loading', HTMLElement).hidden = true;
 }
 
 /** Lists everything that was left out, repaired or ignored. */

@@ -1,5 +1,6 @@
 // The messages between the page and the worker that reads scenes.
 import type { Failure } from './api.js';
+import type { Stage } from './stages.js';
 
 /** What of a glTF file to show: a scene other than the default one, a material variant. */
 export interface Choice {
@@ -44,6 +45,6 @@ export interface Loaded {
 }
 
 export type LoadResponse =
-  | { kind: 'progress'; fraction: number; what: string }
+  | { kind: 'progress'; stage: Stage; fraction: number; what: string }
   | ({ kind: 'scene' } & Loaded)
   | { kind: 'failure'; failure: Failure };

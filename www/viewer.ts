@@ -4,21 +4,22 @@ import type { BiasNote, Camera, Description, DissectedPass, Errors, Failure, Ins
 import { OrbitCamera } from './camera.js';
 import { Controls } from './controls.js';
 import { description, isDefault, normalised, parameterOf, techniqueOf } from './description.js';
+import { sharedDevice } from './device.js';
 import { Fade } from './fade.js';
 import { readDropped, sourceOf, surroundingsOf } from './files.js';
-import { sharedDevice } from './device.js';
-import { SceneLoader } from './loader.js';
+import { type Progress, SceneLoader } from './loader.js';
 import { type Picture, errorsOf } from './measure.js';
 import { RestirError, toFailure } from './messages.js';
+import { pixelAt } from './overlay.js';
 import { Viewer } from './pkg/restir.js';
 import type { Choice, Contents, SceneSource, Surroundings } from './protocol.js';
-import { pixelAt } from './overlay.js';
 import { RenderLoop } from './render-loop.js';
 import { Resolution, defaultBudget, longestSide } from './resolution.js';
+import type { Stage } from './stages.js';
 import { type Settings, defaultSettings, writeQuery } from './url-state.js';
 import { compileWasm, startWasm } from './wasm.js';
 
-export type { BiasNote, Camera, DissectedPass, Inspection, Picture, Choice, Contents, Description, Errors, Failure, Pose, SceneReport, Settings, Stats };
+export type { BiasNote, Camera, Choice, Contents, Description, DissectedPass, Errors, Failure, Inspection, Picture, Pose, SceneReport, Settings, Stage, Stats };
 export { RestirError };
 
 /** One frame. */
@@ -61,8 +62,8 @@ export interface Change {
 }
 
 export interface ViewerEventMap {
-  /** How far a load is, from 0 to 1, and what it does; at 1 the renderer takes it over, and it cannot be cancelled any more. */
-  progress: CustomEvent<{ fraction: number; what: string }>;
+  /** Which stage a load is in, how far it is as a whole, from 0 to 1, and what it does; at 1 the renderer takes it over, and it cannot be cancelled any more. */
+  progress: CustomEvent<{ stage: Stage; fraction: number; what: string }>;
   /** A scene is shown. */
   load: CustomEvent<Scene>;
   /** After each frame. */
@@ -258,6 +259,11 @@ export class RestirViewer extends EventTarget {
   /** Whether a load is running. */
   get loading(): boolean {
     return this.loader.busy;
+  }
+
+  /** Whether a scene is being loaded or taken over by the renderer: until its `load` event. */
+  get opening(): boolean {
+    return this.wanted !== undefined;
   }
 
   /** What is shown; undefined before the first `load` event. */
@@ -747,14 +753,14 @@ export class RestirViewer extends EventTarget {
 
   private async loadAndPresent(source: SceneSource, surroundings: Surroundings | undefined, view: View | undefined): Promise<void> {
     const { lights, seed } = { ...this.settings, ...view };
-    const progress = (fraction: number, what: string) => this.emit('progress', { fraction, what });
-    progress(0, 'Loading');
+    const progress: Progress = (stage, fraction, what) => this.emit('progress', { stage, fraction, what });
+    progress('download', 0, 'Loading');
     // All that can start at once does: the wasm module, the adapter, the worker.
     const loading = this.loader.load(compileWasm(), { source, surroundings, lights, seed }, progress);
     loading.catch(() => undefined);
     await this.start();
     const { flat, contents = noContents } = await loading;
-    progress(1, 'Starting the renderer');
+    progress('pipelines', 1, 'Starting the renderer');
     await this.present(flat, { source, surroundings, contents }, view);
   }
 
