@@ -20,6 +20,7 @@ const css = `
 }
 #divider:focus-visible { outline: 2px solid var(--accent); outline-offset: 1px; }
 #labels { position: absolute; inset: 0.5rem auto auto 0.5rem; margin: 0; padding: 0; display: flex; flex-wrap: wrap; gap: 0.5rem; pointer-events: none; background: none; }
+@media (max-width: 40rem) { #labels { flex-direction: column; align-items: flex-start; } }
 #labels span { padding: 0.15rem 0.5rem; background: var(--surface); border-radius: 6px; }
 `;
 
