@@ -336,6 +336,7 @@ class App {
     menu('navigation').addEventListener('change', () => (view.controls = menu('navigation').value === 'fly' ? 'fly' : 'orbit'));
 
     const file = byId('file', HTMLInputElement);
+    button('gallery').addEventListener('click', () => void this.openGallery());
     button('open').addEventListener('click', () => file.click());
     file.addEventListener('change', () => {
       void this.settle(view.loadFiles([...(file.files ?? [])]));
@@ -397,6 +398,12 @@ class App {
 
   private viewers(): RestirViewer[] {
     return [this.view, ...(this.compare.other ? [this.compare.other] : [])];
+  }
+
+  private async openGallery(): Promise<void> {
+    const { openGallery } = await import('./gallery.js');
+    const show = (scene: string) => void this.settle(this.view.load(scene));
+    openGallery(this.description?.scenes ?? [], this.view.settings.scene, { show, pick: () => byId('file', HTMLInputElement).click() });
   }
 
   private pause(paused: boolean): void {
