@@ -108,6 +108,12 @@ export function render(markdown, { link, image }) {
     // The only HTML that pages have are the marks around generated tables.
     html: ({ text }) => (/^<!--[^]*-->\s*$/.test(text) ? '' : escape(text)),
   };
-  const html = new Marked({ extensions: [inlineFormula], renderer }).parse(markdown);
-  return { html, title, sections, lead };
+  try {
+    const html = new Marked({ extensions: [inlineFormula], renderer }).parse(markdown);
+    return { html, title, sections, lead };
+  } catch (error) {
+    // A dead link or a wrong formula is the page's fault, though the parser asks for a report of its own.
+    error.message = error.message.replace(/\nPlease report this.*/s, '');
+    throw error;
+  }
 }

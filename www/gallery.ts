@@ -3,7 +3,7 @@ import type { SceneInfo } from './api.js';
 
 const own = 'Our own';
 
-/** Whose idea a built-in scene is. The geometry of all is computed by restir, and under its licence: no data of others is in them. */
+/** Whose idea a built-in scene is. The geometry of all is computed by restir, and under its licence. */
 export const credits: Record<string, string> = {
   cornell: 'After that of Cornell University’s Program of Computer Graphics, near to its measures',
   'cornell-64': 'After a report on ReSTIR of 2025; the box after that of Cornell University’s Program of Computer Graphics',
