@@ -59,7 +59,7 @@ const setParameter = (name, value) => (page) =>
   );
 
 const techniques = ['path-tracer', 'ris', 'restir-di-decoupled', 'normals', 'restir-di'];
-const scenes = ['veach-mis', 'motion', 'many-lights:100', 'cornell'];
+const scenes = ['veach-mis', 'motion', 'area-lights', 'cornell'];
 const chooseAll = (menu, values) => values.map((value) => [`${menu} ${value}`, (page) => page.select(`#${menu}`, value)]);
 
 /**
