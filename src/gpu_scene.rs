@@ -53,6 +53,19 @@ pub struct GpuScene {
     features: SceneFeatures,
 }
 
+impl Drop for GpuScene {
+    /// Frees what is large at once: on the web it would otherwise lie about until a garbage collection. Frames that were submitted still
+    /// have it.
+    fn drop(&mut self) {
+        for buffer in [&self.nodes, &self.triangles[0], &self.triangles[1], &self.lights] {
+            buffer.destroy();
+        }
+        for texture in self.textures.iter().chain([&self.environment_radiance, &self.environment_alias]) {
+            texture.texture().destroy();
+        }
+    }
+}
+
 impl GpuScene {
     /// Uploads a scene.
     ///

@@ -1,7 +1,7 @@
 //! The pixel inspector: what one pixel's passes saw in the last frame. Passes are run once more for that pixel alone, with the same
 //! random numbers, and write notes (`shaders/techniques/common/observed.wgsl`); nothing of the picture changes.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::recorder::Recorder;
 use crate::gpu_struct;
@@ -260,6 +260,8 @@ impl Note {
 #[derive(Debug)]
 pub struct Inspector {
     pixel: UVec2,
+    /// Whether a frame has been observed.
+    observed: bool,
     uniform: wgpu::Buffer,
     trace: wgpu::Buffer,
 }
@@ -274,7 +276,12 @@ impl Inspector {
         let inspected = Inspected { pixel, capacity: CAPACITY, padding_0: 0 };
         gpu.queue.write_buffer(&uniform, 0, bytemuck::bytes_of(&inspected));
         let bytes = size_of::<Trace>() + (CAPACITY as usize - 1) * size_of::<Observation>();
-        Ok(Inspector { pixel, uniform, trace: gpu.storage("trace", bytes as u64)? })
+        Ok(Inspector { pixel, observed: false, uniform, trace: gpu.storage("trace", bytes as u64)? })
+    }
+
+    /// Notes that the frame that was shared with it has been recorded.
+    pub fn set_observed(&mut self) {
+        self.observed = true;
     }
 
     /// Has passes of this frame observed.
@@ -287,10 +294,13 @@ impl Inspector {
     /// What was seen in the last frame; `light_kinds` are those of the scene's lights.
     ///
     /// # Errors
-    /// `DEVICE` if it cannot be read back.
+    /// `BAD_VALUE` where no frame has been observed yet, `DEVICE` if it cannot be read back.
     pub fn read(&self, gpu: &Gpu, light_kinds: Vec<u32>) -> impl Future<Output = Result<Inspection>> + use<> {
-        let (gpu, trace, pixel) = (gpu.clone(), self.trace.clone(), self.pixel);
+        let (gpu, trace, pixel, observed) = (gpu.clone(), self.trace.clone(), self.pixel, self.observed);
         async move {
+            if !observed {
+                return Err(Error::bad_value("pixel", "no frame has been rendered since it was chosen"));
+            }
             let bytes = gpu.read_buffer(&trace, trace.size()).await?;
             let (head, notes) = bytes.split_at(size_of::<TraceHead>());
             let head: TraceHead = bytemuck::pod_read_unaligned(head);

@@ -518,7 +518,7 @@ impl Renderer {
     /// What was seen at the inspected pixel in the last frame.
     ///
     /// # Errors
-    /// `BAD_VALUE` where no pixel is inspected, `DEVICE` if it cannot be read back.
+    /// `BAD_VALUE` where no pixel is inspected, or no frame was rendered since; `DEVICE` if it cannot be read back.
     pub fn inspection(&self) -> impl Future<Output = Result<Inspection>> + use<> {
         let kinds = || self.scene.lights.iter().map(|light| light.kind).collect();
         let read = self.inspector.as_ref().map(|inspector| inspector.read(&self.gpu, kinds()));
@@ -589,6 +589,9 @@ impl Renderer {
         }
         recorder.submit();
 
+        if let Some(inspector) = &mut self.inspector {
+            inspector.set_observed();
+        }
         self.accumulated = if restart { 1 } else { self.accumulated + 1 };
         self.restart_film = false;
         self.previous_camera = Some(self.camera.clone());

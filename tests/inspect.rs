@@ -45,7 +45,7 @@ fn assert_weights_are_those_of_resampling(inspection: &Inspection, stage: &str) 
     close(result.unbiased_contribution_weight, sum / sample.target_value, stage);
     let chosen =
         |offer: &&Note| offer.sample.as_ref().is_some_and(|s| (s.light, s.point) == (sample.light, sample.point));
-    assert!(offers.iter().any(|o| chosen(&o)), "{stage}: what was selected was offered");
+    assert!(offers.iter().any(chosen), "{stage}: what was selected was offered");
     if stage != "initial" {
         let confidence: f32 = offers.iter().map(|offer| offer.confidence_weight).sum();
         close(result.confidence_weight, confidence, "confidence weights add up");
@@ -174,6 +174,7 @@ fn nobody_looks_outside() {
     assert_eq!(renderer.inspect(Some(SIZE)).unwrap_err().code(), "BAD_VALUE");
     // A picture that shrinks under the inspector leaves the pixel outside.
     renderer.inspect(Some(UVec2::new(31, 23))).unwrap();
+    assert_eq!(pollster::block_on(renderer.inspection()).unwrap_err().code(), "BAD_VALUE", "nothing was seen yet");
     renderer.resize(UVec2::new(4, 4)).unwrap();
     renderer.render_frame().unwrap();
     assert!(pollster::block_on(renderer.inspection()).unwrap().surface.is_none());

@@ -468,3 +468,50 @@ fn pass_times_include_the_display() {
     render(&mut renderer, 1);
     assert_eq!(displayed(&renderer), 0, "the display was of the frame before");
 }
+
+/// What a technique says of its defaults is what `biases` says of them, and each bias names a parameter that there is.
+#[test]
+fn biases_are_those_of_the_settings_as_they_are() {
+    let keys = |renderer: &Renderer| renderer.biases().iter().map(|bias| bias.parameter).collect::<Vec<_>>();
+    for info in techniques::ALL {
+        let mut renderer = renderer(&gpu(), support::builtin("cornell"), SIZE, info.id, &[]);
+        let own: Vec<_> = keys(&renderer).into_iter().filter(|key| !key.contains('.')).collect();
+        assert_eq!(own.is_empty(), info.unbiased, "{}: {own:?}", info.id);
+        let mut seen = own;
+        for spec in info.params {
+            let standard = spec.value_json(spec.default).to_string().trim_matches('"').to_owned();
+            let values: Vec<String> = match spec.kind {
+                ParamKind::Uint { min, max } => vec![min.to_string(), max.to_string()],
+                ParamKind::Float { min, max } => vec![min.to_string(), max.to_string()],
+                ParamKind::Flag => vec!["true".into(), "false".into()],
+                ParamKind::Choice(names) => names.iter().map(ToString::to_string).collect(),
+            };
+            for value in values {
+                if renderer.set(spec.name, &value).is_ok() {
+                    seen.extend(keys(&renderer));
+                }
+            }
+            renderer.set(spec.name, &standard).expect("the default");
+        }
+        for key in &seen {
+            info.spec(key).unwrap_or_else(|error| panic!("{}: {error}", info.id));
+        }
+        // A flag called indirect leaves light out wherever there is one.
+        assert!(info.params.iter().all(|spec| spec.name != "indirect") || seen.contains(&"indirect"), "{}", info.id);
+    }
+    let mut renderer =
+        renderer(&gpu(), support::builtin("cornell"), SIZE, "restir-di", &[("render.max_depth", "1024")]);
+    renderer.set("render.texture_levels", "finest").expect("a choice");
+    assert!(renderer.biases().is_empty(), "{:?}", renderer.biases());
+    for (name, value, biased) in [
+        ("visibility_in_weights", "no", true),
+        ("visibility_reuse", "no", false),
+        ("reuse_weights", "heuristics", true),
+        ("spatial_reuse", "no", true),
+        ("temporal_reuse", "no", false),
+        ("boiling_filter", "0.5", true),
+    ] {
+        renderer.set(name, value).expect("a setting");
+        assert_eq!(!renderer.biases().is_empty(), biased, "{name} = {value}: {:?}", renderer.biases());
+    }
+}

@@ -3,11 +3,13 @@
 const text = (content: string) => `<mi>${content}</mi>`;
 const row = (...parts: string[]) => `<mrow>${parts.join('')}</mrow>`;
 const operator = (content: string) => `<mo>${content}</mo>`;
+/** No taller than a letter, whatever it holds. */
+const bracket = (content: string) => `<mo stretchy="false">${content}</mo>`;
 const number = (content: string) => `<mn>${content}</mn>`;
 const sub = (base: string, index: string) => `<msub>${base}${index}</msub>`;
 const over = (above: string, below: string) => `<mfrac>${above}${below}</mfrac>`;
 const sum = (index: string) => `<munder>${operator('∑')}${text(index)}</munder>`;
-const of = (name: string, argument: string) => row(name, operator('('), argument, operator(')'));
+const of = (name: string, argument: string) => row(name, bracket('('), argument, bracket(')'));
 const hat = `<mover accent="true">${text('p')}${operator('^')}</mover>`;
 const i = text('i');
 const xi = sub(text('x'), i);

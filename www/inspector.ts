@@ -40,6 +40,8 @@ export class Inspector {
   private pixel: [number, number] | undefined;
   private size: [number, number] = [1, 1];
   private frames: Frame[] = [];
+  /** Ids of the sections that are open. */
+  private open = new Set(['inspector-reservoirs']);
   private readingSince = 0;
   private pressed: [number, number] | undefined;
   private readonly panel = byId('inspector', HTMLElement);
@@ -106,6 +108,9 @@ export class Inspector {
     this.pixel = [Math.min(pixel[0], this.size[0] - 1), Math.min(pixel[1], this.size[1] - 1)];
     this.frames = [];
     byId('inspector-where', HTMLElement).textContent = `Pixel ${this.pixel.join(', ')}`;
+    this.remember();
+    byId('inspector-words', HTMLElement).textContent = 'The next frame will tell.';
+    this.draw();
     try {
       await this.view.inspect(this.pixel);
     } catch {
@@ -132,11 +137,17 @@ export class Inspector {
   private show(): void {
     const seen = this.frames.at(-1)?.seen;
     if (!seen) return;
-    const open = new Set([...this.panel.querySelectorAll('details[open]')].map((each) => each.id));
+    this.remember();
     const why = make('ul', '', ...explainPixel(seen).map((text) => make('li', text)));
     const parts: HTMLElement[] = [why, this.reservoirs(seen), ...this.domains(seen), this.candidates(seen), this.surface(seen), this.history()].filter((part) => part !== undefined);
-    for (const part of parts) if (part instanceof HTMLDetailsElement) part.open = open.has(part.id) || (open.size === 0 && part.id === 'inspector-reservoirs');
+    for (const part of parts) if (part instanceof HTMLDetailsElement) part.open = this.open.has(part.id);
     byId('inspector-words', HTMLElement).replaceChildren(...parts);
+  }
+
+  /** Notes which sections are open, for they are made anew. */
+  private remember(): void {
+    const sections = [...this.panel.querySelectorAll('details')];
+    if (sections.length > 0) this.open = new Set(sections.filter(({ open }) => open).map(({ id }) => id));
   }
 
   private section(id: string, title: string, ...parts: HTMLElement[]): HTMLDetailsElement {

@@ -116,7 +116,9 @@ impl Gpu {
         self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| Error::Device(e.to_string()))?;
         Mapped(slot).await?;
         self.check()?;
-        let view = staging.get_mapped_range(..).map_err(|e| Error::Device(format!("{e:?}")))?;
-        Ok(view.to_vec())
+        let bytes = staging.get_mapped_range(..).map_err(|e| Error::Device(format!("{e:?}")))?.to_vec();
+        // On the web it would otherwise lie about until a garbage collection.
+        staging.destroy();
+        Ok(bytes)
     }
 }
