@@ -16,6 +16,7 @@ import { Steps } from './steps.js';
 import { TimeControls } from './time.js';
 import { showTiming } from './timing.js';
 import { TimingHistory } from './timing-history.js';
+import { legendOf } from './views.js';
 import { type Change, RestirViewer, type Sample, type Scene, type ViewerFailure } from './viewer.js';
 
 const defaultScene = 'cornell';
@@ -266,6 +267,7 @@ class App {
     fillMenu(menu('technique'), (this.description?.techniques ?? []).map(({ id, title }) => [id, title]), settings.technique);
     this.showPresets();
     fillMenu(menu('view'), (technique?.views ?? []).map((name) => [name, name]), settings.view);
+    this.showLegend();
     fillMenu(menu('scale'), scales, String(settings.scale ?? ''));
     this.showBudget();
     const summary = byId('summary', HTMLElement);
@@ -276,6 +278,13 @@ class App {
     showPanel(byId('panel', HTMLElement), this.groups(), settings.values, (key, value) => this.setParam(key, value));
     filterPanel(byId('panel', HTMLElement), byId('search', HTMLInputElement).value);
     void this.showBiases();
+  }
+
+  /** What the colours of the view say. */
+  private showLegend(): void {
+    const legend = byId('legend', HTMLElement);
+    legend.textContent = legendOf(this.edited.settings.view);
+    legend.hidden = legend.textContent === '';
   }
 
   /** Marks what biases the picture as it is now. */
@@ -325,7 +334,7 @@ class App {
     });
     const search = byId('search', HTMLInputElement);
     search.addEventListener('input', () => filterPanel(byId('panel', HTMLElement), search.value));
-    menu('view').addEventListener('change', () => void this.edited.setView(menu('view').value));
+    menu('view').addEventListener('change', () => void this.edited.setView(menu('view').value).then(() => this.showLegend(), () => this.showMenus()));
     menu('target').addEventListener('change', () => this.edit(menu('target').value));
     button('compare').addEventListener('click', () => (this.compare.other ? this.compare.close() : void this.openCompare()));
     menu('scale').addEventListener('change', () => void view.setScale(Number(menu('scale').value) || undefined));

@@ -3,23 +3,14 @@ import { strict as assert } from 'node:assert';
 import { readFileSync } from 'node:fs';
 import { after, before, test } from 'node:test';
 import { browserName, slack } from './browsers.mjs';
-import { assertNoProblems, openPage, openSite, readDisplay, waitForFrames, waitForMessage } from './pages.mjs';
+import { openSite, readDisplay, waitForFrames, waitForMessage, withPage } from './pages.mjs';
 import { cook } from './native.mjs';
 
 let site;
 before(async () => (site = await openSite()));
 after(() => site.close());
 
-async function withPage(query, work, prepare) {
-  const { page, problems } = await openPage(site, query, prepare);
-  try {
-    await waitForFrames(page, 1);
-    await work(page);
-    assertNoProblems(problems);
-  } finally {
-    await page.close();
-  }
-}
+const open = (query, work, prepare) => withPage(site, query, work, prepare);
 
 const small = '?scene=cornell&technique=normals&size=24x16&frames=1';
 
@@ -101,7 +92,7 @@ async function assertTwins(page, withExtension, without, view) {
 }
 
 test('Draco', () =>
-  withPage(small, async (page) => {
+  open(small, async (page) => {
     const [draco] = cases('draco.json');
     const indices = bytes(draco.indices);
     const meshes = (extension) => [{ primitives: [{ ...primitive, ...extension }] }];
@@ -129,7 +120,7 @@ test('Draco', () =>
   }));
 
 test('meshopt', () =>
-  withPage(small, async (page) => {
+  open(small, async (page) => {
     const all = cases('meshopt.json');
     const parts = ['exponential v1', 'octahedral 8 v1', 'sheet TRIANGLES'].map((name) => all.find((entry) => entry.name === name));
     const name = 'KHR_meshopt_compression';
@@ -177,7 +168,7 @@ for (const [name, file, twin] of [
   ['EXT_texture_webp', 'lossless.webp', 'lossless.png'],
 ]) {
   test(`${name}, ${file}`, () =>
-    withPage(small, async (page) => {
+    open(small, async (page) => {
       const images = [{ bufferView: 2 }];
       const required = { extensionsUsed: [name], extensionsRequired: [name] };
       const withExtension = glb({ ...quad, images, textures: [{ extensions: { [name]: { source: 0 } } }], ...required }, [...quadViews, data(file)]);
@@ -187,7 +178,7 @@ for (const [name, file, twin] of [
 }
 
 test('Wavefront OBJ with its MTL', () =>
-  withPage(small, async (page) => {
+  open(small, async (page) => {
     const obj = 'mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n';
     const files = [
       { name: 'a.obj', bytes: Buffer.from(obj) },
@@ -201,7 +192,7 @@ test('Wavefront OBJ with its MTL', () =>
   }));
 
 test('a scene that the command line has cooked, and one of another version', () =>
-  withPage(small, async (page) => {
+  open(small, async (page) => {
     const cooked = await cook('builtin:cornell');
     const direct = await readDisplay(page);
     await drop(page, [{ name: 'cornell.restir', bytes: cooked }]);
@@ -215,7 +206,7 @@ test('a scene that the command line has cooked, and one of another version', () 
   }));
 
 test('variants and scenes are chosen in menus', () =>
-  withPage(small, async (page) => {
+  open(small, async (page) => {
     const name = 'KHR_materials_variants';
     const color = (baseColorFactor) => ({ pbrMetallicRoughness: { baseColorFactor } });
     const mappings = [{ material: 1, variants: [0] }];
@@ -289,7 +280,7 @@ const dropLarge = (page) =>
   });
 
 test('a load is cancelled, and the former scene stays', () =>
-  withPage(small, async (page) => {
+  open(small, async (page) => {
     const before_ = await readDisplay(page);
     await upload(page, 'large.glb', grid(400));
     await dropLarge(page);
@@ -305,7 +296,7 @@ test('a load is cancelled, and the former scene stays', () =>
 // those of 50 ms and more.
 const onlyChromium = { skip: browserName !== 'chromium' };
 test('a scene of a million triangles does not block the page for 50 ms', onlyChromium, () =>
-  withPage(
+  open(
     small,
     async (page) => {
       await upload(page, 'million.glb', grid(708));

@@ -4,22 +4,13 @@ import { readdirSync, statSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { dist } from '../../scripts/build.mjs';
-import { assertNoProblems, contrast, openPage, openSite, readDisplay, waitForFrames } from './pages.mjs';
+import { contrast, openSite, readDisplay, waitForFrames, withPage } from './pages.mjs';
 
 let site;
 before(async () => (site = await openSite()));
 after(() => site.close());
 
-async function withPage(work) {
-  const { page, problems } = await openPage(site, '?scene=furnace&size=48x32&frames=2&technique=path-tracer');
-  try {
-    await waitForFrames(page, 1);
-    await work(page);
-    assertNoProblems(problems);
-  } finally {
-    await page.close();
-  }
-}
+const withGallery = (work) => withPage(site, '?scene=furnace&size=48x32&frames=2&technique=path-tracer', work);
 
 const fetched = (page) => page.evaluate(() => performance.getEntriesByType('resource').map(({ name }) => name).filter((name) => name.includes('gallery')));
 const focused = (page) => page.evaluate(() => document.activeElement.value);
@@ -39,7 +30,7 @@ async function untilShown(page, scene) {
 }
 
 test('every built-in scene has a picture, a line and a credit; nothing is fetched before the gallery is opened', () =>
-  withPage(async (page) => {
+  withGallery(async (page) => {
     assert.deepEqual(await fetched(page), []);
     await open(page);
     const names = await page.evaluate(async () => {
@@ -67,7 +58,7 @@ test('every built-in scene has a picture, a line and a credit; nothing is fetche
   }));
 
 test('a scene is chosen by a click', () =>
-  withPage(async (page) => {
+  withGallery(async (page) => {
     await open(page);
     assert.equal(await page.$eval('#gallery-dialog [aria-current]', ({ value }) => value), 'furnace');
     await page.click('#gallery-dialog button[value="cornell"]');
@@ -80,7 +71,7 @@ test('a scene is chosen by a click', () =>
   }));
 
 test('a scene is chosen by keys, and Escape leaves all as it is', () =>
-  withPage(async (page) => {
+  withGallery(async (page) => {
     await page.focus('#gallery');
     await page.keyboard.press('Enter');
     await page.waitForSelector('#gallery-dialog[open] li button');
@@ -104,7 +95,7 @@ test('a scene is chosen by keys, and Escape leaves all as it is', () =>
   }));
 
 test('a file of one’s own is picked from there', () =>
-  withPage(async (page) => {
+  withGallery(async (page) => {
     await open(page);
     await page.evaluate(() => document.getElementById('file').addEventListener('click', (event) => (event.preventDefault(), (window.picked = true))));
     await page.click('#gallery-own');
@@ -114,7 +105,7 @@ test('a file of one’s own is picked from there', () =>
   }));
 
 test('it fits a phone', () =>
-  withPage(async (page) => {
+  withGallery(async (page) => {
     await open(page);
     await page.setViewport({ width: 360, height: 640 });
     const { wide, inside } = await page.$eval('#gallery-dialog', (dialog) => ({ wide: dialog.scrollWidth - dialog.clientWidth, inside: dialog.getBoundingClientRect().right <= innerWidth }));

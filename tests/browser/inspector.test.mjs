@@ -1,24 +1,18 @@
 // The pixel inspector, a frame pass by pass, maps of difference, marks of bias, focus: with real clicks and keys.
 import { strict as assert } from 'node:assert';
 import { after, before, test } from 'node:test';
-import { assertNoProblems, openPage, openSite, readDisplay, waitForFrames } from './pages.mjs';
+import { openSite, readDisplay, waitForFrames, withPage } from './pages.mjs';
 
 let site;
 before(async () => (site = await openSite()));
 after(() => site.close());
 
-async function withPage(query, work) {
-  const { page, problems } = await openPage(site, query);
-  // Wide enough for what lies beside the picture: on a small screen it lies over it.
-  await page.setViewport({ width: 1280, height: 800 });
-  try {
-    await waitForFrames(page, 1);
+/** Wide enough for what lies beside the picture: on a small screen it lies over it. */
+const open = (query, work) =>
+  withPage(site, query, async (page) => {
+    await page.setViewport({ width: 1280, height: 800 });
     await work(page);
-    assertNoProblems(problems);
-  } finally {
-    await page.close();
-  }
-}
+  });
 
 const text = (page, id) => page.$eval(`#${id}`, (element) => element.textContent);
 const isHidden = (page, id) => page.$eval(`#${id}`, (element) => element.hidden);
@@ -31,7 +25,7 @@ const rows = (page, id) =>
   page.$$eval(`#inspector-${id} tbody tr`, (all) => all.map((row) => [...row.cells].map(({ textContent }) => (Number.isNaN(Number(textContent)) ? textContent : Number(textContent)))));
 
 test('a click on a pixel tells what the passes saw there, and the figures add up', () =>
-  withPage('?scene=cornell&size=48x36&spatial_confidence_limit=1000&indirect=false', async (page) => {
+  open('?scene=cornell&size=48x36&spatial_confidence_limit=1000&indirect=false', async (page) => {
     await page.click('#inspect');
     // The floor, left of the middle: 1280 by 800 shows 48 by 36 with bars left and right.
     await page.mouse.click(560, 660);
@@ -64,7 +58,7 @@ test('a click on a pixel tells what the passes saw there, and the figures add up
   }));
 
 test('a drag while inspecting still turns the camera, and chooses no pixel', () =>
-  withPage('?scene=cornell&size=24x18&technique=ris', async (page) => {
+  open('?scene=cornell&size=24x18&technique=ris', async (page) => {
     await page.click('#inspect');
     await inspectorSays(page, 'Pixel 12, 9');
     await page.mouse.move(600, 400);
@@ -76,7 +70,7 @@ test('a drag while inspecting still turns the camera, and chooses no pixel', () 
   }));
 
 test('why: the background has no surface, the light shines itself', () =>
-  withPage('?scene=veach-mis&size=40x30&technique=normals', async (page) => {
+  open('?scene=veach-mis&size=40x30&technique=normals', async (page) => {
     const pixels = await page.evaluate(async () => {
       const found = {};
       for (let y = 0; y < 30; y += 3) {
@@ -100,7 +94,7 @@ test('why: the background has no surface, the light shines itself', () =>
   }));
 
 test('a frame pass by pass: pictures, equations and sources of each', () =>
-  withPage('?scene=cornell&size=32x24&spatial_confidence_limit=1000', async (page) => {
+  open('?scene=cornell&size=32x24&spatial_confidence_limit=1000', async (page) => {
     await page.focus('#canvas');
     await page.keyboard.press('t');
     await page.waitForSelector('#steps:not([hidden])');
@@ -131,7 +125,7 @@ test('a frame pass by pass: pictures, equations and sources of each', () =>
   }));
 
 test('maps of difference: against the reference, and against picture B', () =>
-  withPage('?scene=cornell&size=32x24&technique=path-tracer&render.max_depth=1&frames=4', async (page) => {
+  open('?scene=cornell&size=32x24&technique=path-tracer&render.max_depth=1&frames=4', async (page) => {
     await waitForFrames(page, 4);
     await page.click('#errors summary');
     await page.select('#difference', 'flip');
@@ -158,7 +152,7 @@ test('maps of difference: against the reference, and against picture B', () =>
   }));
 
 test('settings that bias are marked as they are set, contradictions with others included', () =>
-  withPage('?scene=cornell&size=24x16&frames=2', async (page) => {
+  open('?scene=cornell&size=24x16&frames=2', async (page) => {
     const biased = () => page.$$eval('.parameter .bias:not([hidden])', (all) => all.map((mark) => mark.closest('.parameter').dataset.key).sort());
     const becomes = async (...wanted) => {
       await page.waitForFunction((keys) => [...document.querySelectorAll('.parameter .bias:not([hidden])')].map((mark) => mark.closest('.parameter').dataset.key).sort().join() === keys, { polling: 50 }, wanted.sort().join());
@@ -175,7 +169,7 @@ test('settings that bias are marked as they are set, contradictions with others 
   }));
 
 test('a double click turns the camera to what is there, which it then orbits', () =>
-  withPage('?scene=cornell&size=40x40&technique=normals&render.pixel_filter=center', async (page) => {
+  open('?scene=cornell&size=40x40&technique=normals&render.pixel_filter=center', async (page) => {
     const [x, y] = [500, 520];
     const expected = await page.evaluate(async (px, py) => {
       return window.restir.call(async (viewer) => {
@@ -194,7 +188,7 @@ test('a double click turns the camera to what is there, which it then orbits', (
   }));
 
 test('viewers of a page share one device', () =>
-  withPage('?scene=cornell&size=24x16&frames=2', async (page) => {
+  open('?scene=cornell&size=24x16&frames=2', async (page) => {
     await page.evaluate(() => {
       window.devices = 0;
       const { requestDevice } = GPUAdapter.prototype;

@@ -83,3 +83,15 @@ export function contrast(rgb, width, height) {
 export function assertNoProblems(problems) {
   assert.deepEqual(problems, [], 'console errors, exceptions or failed requests');
 }
+
+/** Opens the page as `openPage` does, waits for its first frame, does the `work`, and fails if the page had problems. */
+export async function withPage(site, query, work, before) {
+  const { page, problems } = await openPage(site, query, before);
+  try {
+    await waitForFrames(page, 1);
+    await work(page);
+    assertNoProblems(problems);
+  } finally {
+    await page.close();
+  }
+}

@@ -3,7 +3,7 @@ import { strict as assert } from 'node:assert';
 import { after, before, test } from 'node:test';
 import { compareNatively, renderNatively } from './native.mjs';
 import { decodePng } from './png.mjs';
-import { assertNoProblems, openPage, openSite, readDisplay, waitForFrames, waitForMessage } from './pages.mjs';
+import { assertNoProblems, openPage, openSite, readDisplay, waitForFrames, waitForMessage, withPage } from './pages.mjs';
 
 let site;
 before(async () => (site = await openSite()));
@@ -13,16 +13,7 @@ after(() => site.close());
 const keepCopies = () =>
   Object.defineProperty(navigator, 'clipboard', { value: { writeText: async (text) => void (window.copied = text) } });
 
-async function withPage(query, work) {
-  const { page, problems } = await openPage(site, query, keepCopies);
-  try {
-    await waitForFrames(page, 1);
-    await work(page);
-    assertNoProblems(problems);
-  } finally {
-    await page.close();
-  }
-}
+const open = (query, work) => withPage(site, query, work, keepCopies);
 
 const small = '?scene=cornell&size=24x16&frames=2';
 const value = (page, selector) => page.$eval(selector, (element) => element.value);
@@ -31,7 +22,7 @@ const withAlpha = (rgb) => Uint8Array.from({ length: (rgb.length / 3) * 4 }, (_,
 const addressHas = (page, text) => page.waitForFunction((wanted) => location.search.includes(wanted), { polling: 50 }, text);
 
 test('a preset sets technique and parameters, and is left when one of them changes', () =>
-  withPage(small, async (page) => {
+  open(small, async (page) => {
     assert.equal(await value(page, '#preset'), '');
     await page.select('#preset', 'wyman-2021-unbiased');
     await addressHas(page, 'visibility=mis');
@@ -56,7 +47,7 @@ test('a preset sets technique and parameters, and is left when one of them chang
   }));
 
 test('a setting that contradicts another is refused in words, and shown as it was', () =>
-  withPage('?scene=cornell&size=24x16&frames=1&technique=restir-di-decoupled&reuse_weights=heuristics', async (page) => {
+  open('?scene=cornell&size=24x16&frames=1&technique=restir-di-decoupled&reuse_weights=heuristics', async (page) => {
     await page.select('#parameter-visibility', 'mis');
     assert.match(await waitForMessage(page), /mis.*heuristics|heuristics.*mis/s);
     assert.equal(await value(page, '#parameter-visibility'), 'decoupled');
@@ -64,14 +55,14 @@ test('a setting that contradicts another is refused in words, and shown as it wa
   }));
 
 test('a link may say yes for true', () =>
-  withPage(`${small}&spatial_feedback=yes&temporal_reuse=on`, async (page) => {
+  open(`${small}&spatial_feedback=yes&temporal_reuse=on`, async (page) => {
     assert.ok(await page.$eval('#parameter-spatial_feedback', (box) => box.checked));
     await addressHas(page, 'spatial_feedback=true');
     assert.ok(!(await page.evaluate(() => location.search)).includes('temporal_reuse'), 'that is the default');
   }));
 
 test('settings are searched by name and by what they do', () =>
-  withPage(small, async (page) => {
+  open(small, async (page) => {
     const shown = () => page.$$eval('.parameter', (rows) => rows.filter((row) => row.offsetParent !== null).map((row) => row.querySelector('label').htmlFor));
     const all = (await shown()).length;
     await page.type('#search', 'same block of 4');
@@ -90,7 +81,7 @@ test('settings are searched by name and by what they do', () =>
   }));
 
 test('? lists the keys, and Escape closes the list', () =>
-  withPage(small, async (page) => {
+  open(small, async (page) => {
     await page.focus('#canvas');
     await page.keyboard.type('?');
     assert.ok(await page.$eval('#help', (help) => help.open && help.innerText.includes('Wheel')));
@@ -99,7 +90,7 @@ test('? lists the keys, and Escape closes the list', () =>
   }));
 
 test('passes are listed with their times, or it is said that they cannot be', () =>
-  withPage('?scene=cornell&size=24x16', async (page) => {
+  open('?scene=cornell&size=24x16', async (page) => {
     await page.click('#timing summary');
     // The first frame has no temporal pass.
     await waitForFrames(page, 3);
@@ -110,7 +101,7 @@ test('passes are listed with their times, or it is said that they cannot be', ()
   }));
 
 test('the picture is saved, a link copied that shows it, and a command line that renders it', () =>
-  withPage(`${small}&technique=normals&render.pixel_filter=center&seed=5`, async (page) => {
+  open(`${small}&technique=normals&render.pixel_filter=center&seed=5`, async (page) => {
     await page.evaluate(() => {
       HTMLAnchorElement.prototype.click = function () {
         window.saved = fetch(this.href).then(async (file) => ({ name: this.download, bytes: [...new Uint8Array(await file.arrayBuffer())] }));
@@ -154,7 +145,7 @@ test('the picture is saved, a link copied that shows it, and a command line that
   }));
 
 test('errors against a reference are those of the command line, are drawn, and end when the camera moves', () =>
-  withPage('?scene=cornell&technique=path-tracer&size=24x16&frames=64&render.max_depth=1', async (page) => {
+  open('?scene=cornell&technique=path-tracer&size=24x16&frames=64&render.max_depth=1', async (page) => {
     const told = () => page.$eval('#errors-table', (table) => table.innerText);
     await waitForFrames(page, 64);
     await page.click('#errors summary');
@@ -196,7 +187,7 @@ test('errors against a reference are those of the command line, are drawn, and e
   }));
 
 test('two pictures side by side: their own settings, one camera, a divider, and a link that holds both', () =>
-  withPage('?scene=cornell&technique=normals&size=24x16&frames=2&render.pixel_filter=center', async (page) => {
+  open('?scene=cornell&technique=normals&size=24x16&frames=2&render.pixel_filter=center', async (page) => {
     const second = (tab) =>
       tab.evaluate(async () => btoa(String.fromCharCode(...(await window.restir.other((viewer) => viewer.read_display())))));
     const untilSecond = (tab, text) => tab.waitForFunction((wanted) => document.getElementById('label-b').textContent.includes(wanted), { polling: 50 }, text);
@@ -279,3 +270,17 @@ test('links and commands say all that determines a picture', async () => {
   );
   assert.deepEqual(readQuery('?scene-index=x&size=9000x9').warnings.length, 2);
 });
+
+test('every view but the picture says what its colours mean', () =>
+  open(small, async (page) => {
+    const silent = await page.evaluate(async () => {
+      const { describe } = await import(new URL('pkg/restir.js', location.href).href);
+      const { legendOf } = await import(new URL('views.js', location.href).href);
+      return JSON.parse(describe()).techniques.flatMap(({ views }) => views).filter((view) => view !== 'radiance' && !legendOf(view));
+    });
+    assert.deepEqual(silent, []);
+    await page.select('#view', 'motion');
+    await page.waitForFunction(() => /grey at rest/.test(document.getElementById('legend').textContent), { polling: 50 });
+    await page.select('#view', 'radiance');
+    await page.waitForFunction(() => document.getElementById('legend').hidden, { polling: 50 });
+  }));

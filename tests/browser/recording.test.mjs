@@ -5,7 +5,7 @@ import { mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'n
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { assertNoProblems, openPage, openSite, readDisplay, waitForFrames, waitForMessage } from './pages.mjs';
+import { openPage, openSite, readDisplay, waitForFrames, waitForMessage, withPage } from './pages.mjs';
 import { decodePng } from './png.mjs';
 
 let site;
@@ -29,16 +29,7 @@ async function saved(page) {
   return { name, bytes: Buffer.from(text, 'base64') };
 }
 
-async function withPage(query, work, prepare = keepDownloads) {
-  const { page, problems } = await openPage(site, query, prepare);
-  try {
-    await waitForFrames(page, 1);
-    await work(page);
-    assertNoProblems(problems);
-  } finally {
-    await page.close();
-  }
-}
+const open = (query, work, prepare = keepDownloads) => withPage(site, query, work, prepare);
 
 /** The files of a zip, by name, as the system unpacks it. */
 function unzip(bytes) {
@@ -66,7 +57,7 @@ test('a zip holds its files, empty ones as well', async () => {
 });
 
 test('the pictures of an animation are those of their moments, and the page goes on as before', () =>
-  withPage('?scene=motion&technique=path-tracer&render.max_depth=1&size=32x24&time=0.5&accumulate=yes&frames=2&seed=3', async (page) => {
+  open('?scene=motion&technique=path-tracer&render.max_depth=1&size=32x24&time=0.5&accumulate=yes&frames=2&seed=3', async (page) => {
     await waitForFrames(page, 2);
     const before = await readDisplay(page);
     await page.click('#recording summary');
@@ -107,7 +98,7 @@ test('the pictures of an animation are those of their moments, and the page goes
   }));
 
 test('a video is a WebM file with moving pictures in it', () =>
-  withPage('?scene=motion&technique=normals&size=64x48', async (page) => {
+  open('?scene=motion&technique=normals&size=64x48', async (page) => {
     await page.click('#recording summary');
     await page.click('#record-video');
     await page.waitForFunction(() => /^Stop, ([3-9]|\d\d) s$/.test(document.getElementById('record-video').textContent), { polling: 50 });
@@ -145,7 +136,7 @@ test('a video is a WebM file with moving pictures in it', () =>
   }));
 
 test('where the browser records no video it says so', () =>
-  withPage(
+  open(
     '?scene=cornell&technique=normals&size=16x16&frames=1',
     async (page) => {
       await page.click('#recording summary');
