@@ -69,14 +69,14 @@ pub struct Observation {
 gpu_struct! {
 /// What the pixel shows, as `shaders/scene/trace.wgsl` declares it.
 pub struct TraceHead {
-    /// Notes, also those that there was no room for.
+    /// Notes.
     pub count: u32,
     /// `NONE` where there is no surface.
     pub instance: u32,
     /// Of the mesh.
     pub triangle: u32,
-    /// Unused.
-    pub padding_0: u32,
+    /// Notes that there was no room for.
+    pub dropped: u32,
     /// World space.
     pub position: Vec3,
     /// Metres along the view axis.
@@ -304,8 +304,7 @@ impl Inspector {
             let bytes = gpu.read_buffer(&trace, trace.size()).await?;
             let (head, notes) = bytes.split_at(size_of::<TraceHead>());
             let head: TraceHead = bytemuck::pod_read_unaligned(head);
-            let kept = head.count.min(CAPACITY);
-            let notes = notes.chunks_exact(size_of::<Observation>()).take(kept as usize);
+            let notes = notes.chunks_exact(size_of::<Observation>()).take(head.count as usize);
             let surface = (head.instance != NONE).then(|| InspectedSurface {
                 instance: head.instance,
                 triangle: head.triangle,
@@ -324,7 +323,7 @@ impl Inspector {
                 mean: head.mean.truncate().to_array(),
                 samples: head.samples,
                 notes: notes.map(|note| Note::new(&bytemuck::pod_read_unaligned(note), &light_kinds)).collect(),
-                dropped: head.count - kept,
+                dropped: head.dropped,
             })
         }
     }

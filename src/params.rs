@@ -250,7 +250,7 @@ impl RenderParams {
         crate::techniques::biases_that_hold(&[
             (
                 self.max_depth < MOST_DEPTH,
-                "render.max_depth",
+                crate::techniques::MAX_DEPTH,
                 "longer paths are left out: darker, the less the more events there are",
             ),
             (self.pixel_filter == 1, "render.pixel_filter", "edges are not smoothed"),

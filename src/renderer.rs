@@ -316,7 +316,8 @@ impl Renderer {
 
     /// Which settings, as they are now, bias the picture.
     pub fn biases(&self) -> Vec<Bias> {
-        [self.technique.biases(), self.render_params.biases()].concat()
+        let of_all = self.render_params.biases().into_iter().filter(|bias| self.technique.obeys(bias.parameter));
+        self.technique.biases().into_iter().chain(of_all).collect()
     }
 
     /// Shows a debug view, or `radiance`.

@@ -179,3 +179,13 @@ fn nobody_looks_outside() {
     renderer.render_frame().unwrap();
     assert!(pollster::block_on(renderer.inspection()).unwrap().surface.is_none());
 }
+
+#[test]
+fn more_candidates_than_notes_leave_room_for_what_became_of_them() {
+    let settings =
+        [("light_samples", "1024"), ("reservoir_size", "4"), ("stratified", "yes"), ("temporal_reuse", "no")];
+    let mut renderer = renderer("cornell", "restir-di", &settings);
+    let seen = inspect(&mut renderer, UVec2::new(16, 20), 1);
+    assert_eq!(of(&seen, "result", "initial").count(), 4);
+    assert_eq!(of(&seen, "candidate", "initial").count() as u32 + seen.dropped, 4 * 1024);
+}

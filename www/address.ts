@@ -30,7 +30,10 @@ export function readAddress(search: string): Address {
 const delay = 300;
 
 /** What the browser keeps of an entry beside its address. */
-type Entry = { files: number } | null;
+type Entry = { files: string } | null;
+
+/** Entries outlive the page's files: those of another life of the page mean nothing to this one. */
+const life = crypto.getRandomValues(new Uint32Array(2)).join('-');
 
 const same = (href: string, entry: Entry) => href === location.href && entry?.files === (history.state as Entry)?.files;
 
@@ -39,8 +42,8 @@ export class PageAddress {
   private pending: { href: string; entry: Entry; timer: number } | undefined;
   /** Restorations that go on: what changes meanwhile is no choice of the user's. */
   private restoring = 0;
-  /** By their place in this list, which an entry of the history keeps. They last as long as the page does. */
-  private readonly files: OwnFiles[] = [];
+  /** By their key, which an entry of the history keeps. They last as long as the page does. */
+  private readonly files = new Map<string, OwnFiles>();
 
   constructor(
     /** The address of what is shown. */
@@ -54,8 +57,8 @@ export class PageAddress {
       // What was about to be written belongs to an entry that has been left.
       this.drop();
       // A jump to a place in the page changes nothing.
-      if (same(this.link(), this.entry())) return;
-      void this.restore(show(readAddress(location.search), this.files[(history.state as Entry)?.files ?? -1]));
+      if (this.restoring === 0 && same(this.link(), this.entry())) return;
+      void this.restore(show(readAddress(location.search), this.files.get((history.state as Entry)?.files ?? '')));
     });
   }
 
@@ -94,7 +97,11 @@ export class PageAddress {
   private entry(): Entry {
     const shown = this.shown();
     if (!shown) return null;
-    const known = this.files.findIndex(({ source, surroundings }) => source === shown.source && surroundings === shown.surroundings);
-    return { files: known >= 0 ? known : this.files.push(shown) - 1 };
+    for (const [files, { source, surroundings }] of this.files) {
+      if (source === shown.source && surroundings === shown.surroundings) return { files };
+    }
+    const files = `${life}-${this.files.size}`;
+    this.files.set(files, shown);
+    return { files };
   }
 }

@@ -70,6 +70,7 @@ class App {
   private statsTime = 0;
   private hadScene = false;
   private meter: ErrorMeter | undefined;
+  private difference: Difference | undefined;
   /** Of the last frame: rendered pixels, frames in the picture, and the scene's moment. */
   private size: [number, number] = [1280, 720];
   private frames = 0;
@@ -89,7 +90,7 @@ class App {
     if (matchMedia('(max-width: 30rem)').matches) this.fold();
     this.follow();
     this.meter = new ErrorMeter(view);
-    new Difference(view, this.compare);
+    this.difference = new Difference(view, this.compare);
     new Inspector(view, byId('canvas', HTMLCanvasElement));
     new Steps(view, () => this.pause(true));
     new Recording(view, this.compare, () => this.fileName());
@@ -139,8 +140,11 @@ class App {
     const { code, message, setting, stopped } = failure;
     if (setting !== undefined) return void this.query.warnings.push(`${setting} in the address: ${message}`);
     // After an internal failure the wasm module is in an unknown state: only a reload is a restart.
-    const onRestart = code === 'INTERNAL' ? () => location.reload() : () => void this.view.restore();
-    if (stopped) showError(failure, { onRestart });
+    const restore = () => {
+      for (const each of this.viewers()) if (each.stopped) void each.restore();
+    };
+    if (stopped) hideProgress();
+    if (stopped) showError(failure, { onRestart: code === 'INTERNAL' ? () => location.reload() : restore });
     else showError(failure, { final: code === 'NO_WEBGPU' || code === 'NO_ADAPTER' });
   }
 
@@ -401,6 +405,7 @@ class App {
     button('compare').setAttribute('aria-pressed', String(other !== undefined));
     if (!other && this.edited !== this.view) this.edit('a');
     this.meter?.compareWith(other);
+    this.difference?.update();
     if (change) this.noteChange(change);
     else this.address.chosen();
   }

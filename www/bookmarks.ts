@@ -23,13 +23,19 @@ function read(): Kept {
   }
 }
 
+const isVector = (value: unknown) => Array.isArray(value) && value.length === 3 && value.every(Number.isFinite);
+
+const isBookmark = (value: Partial<Bookmark> | null): value is Bookmark =>
+  typeof value?.name === 'string' && typeof value.camera === 'string' && [value.pose?.position, value.pose?.forward, value.pose?.up].every(isVector);
+
 /** The bookmarks of one scene. */
 export class Bookmarks {
   constructor(private readonly scene: string) {}
 
   get all(): Bookmark[] {
     const list: unknown = read()[this.scene];
-    return Array.isArray(list) ? (list as Bookmark[]) : [];
+    // What something else has written there is passed over.
+    return Array.isArray(list) ? (list as (Partial<Bookmark> | null)[]).filter(isBookmark) : [];
   }
 
   /** The place of the bookmark at which the camera is; -1 where it is at none. */

@@ -45,6 +45,8 @@ export class Compare {
   private readonly labels = make('div', { id: 'labels', part: 'labels' });
   private readonly names = { a: make('span', { id: 'label-a' }), b: make('span', { id: 'label-b' }) };
   private canvas: HTMLCanvasElement | undefined;
+  /** To the first picture, until it is disposed of. */
+  private readonly listening = new AbortController();
 
   constructor(
     private readonly first: RestirViewer,
@@ -70,10 +72,11 @@ export class Compare {
       event.preventDefault();
       this.part(to);
     });
-    first.addEventListener('camera-change', ({ detail }) => void this.second?.setCamera(detail, { moving: true }));
-    first.addEventListener('load', () => this.follow());
-    first.addEventListener('param-change', ({ detail }) => this.pass(detail.name));
-    first.addEventListener('sample', ({ detail }) => this.second && this.label('a', first, detail.count));
+    const { signal } = this.listening;
+    first.addEventListener('camera-change', ({ detail }) => void this.second?.setCamera(detail, { moving: true }), { signal });
+    first.addEventListener('load', () => this.follow(), { signal });
+    first.addEventListener('param-change', ({ detail }) => this.pass(detail.name), { signal });
+    first.addEventListener('sample', ({ detail }) => this.second && this.label('a', first, detail.count), { signal });
   }
 
   /** The second picture's viewer, while there is one. */
@@ -130,6 +133,7 @@ export class Compare {
   /** Closes it, and takes away what it put over the first picture. */
   dispose(): void {
     this.close();
+    this.listening.abort();
     for (const element of [this.divider, this.labels]) element.remove();
   }
 

@@ -39,6 +39,8 @@ export class Difference {
   private readonly menu = byId('difference', HTMLSelectElement);
   private readonly canvas = byId('map', HTMLCanvasElement);
   private readonly words = byId('difference-words', HTMLElement);
+  /** When the next map may be made. */
+  private timer = 0;
   private last = 0;
   private busy = false;
 
@@ -46,12 +48,14 @@ export class Difference {
     private readonly view: RestirViewer,
     private readonly compare: Compare,
   ) {
-    this.menu.addEventListener('change', () => {
-      this.last = 0;
-      void this.show();
-    });
-    view.addEventListener('sample', () => void this.show());
-    view.addEventListener('load', () => void this.show());
+    this.menu.addEventListener('change', () => this.update());
+    for (const event of ['sample', 'load', 'camera-change'] as const) view.addEventListener(event, () => this.update());
+  }
+
+  /** Picture B has come, gone or changed. */
+  update(): void {
+    clearTimeout(this.timer);
+    this.timer = window.setTimeout(() => void this.show(), Math.max(0, this.last + interval - performance.now()));
   }
 
   /** Picture B where there is one, else the reference. */
@@ -66,20 +70,20 @@ export class Difference {
       this.canvas.hidden = this.words.hidden = true;
       return;
     }
-    const now = performance.now();
-    if (this.busy || now - this.last < interval) return;
+    // What is asked for meanwhile is made afterwards.
+    if (this.busy) return this.update();
     this.busy = true;
-    this.last = now;
+    this.last = performance.now();
     try {
       const [picture, other] = await Promise.all([this.view.readPicture(), this.other()]);
       if (!other) return this.say('Keep a reference, or compare with a second picture.');
       if (picture.width !== other.width || picture.height !== other.height) return this.say('The two are of different sizes.');
       const values = kind === 'flip' ? await flipOf(picture, other) : signedDifference(picture, other);
       if (this.menu.value !== kind) return;
-      this.draw(picture, values, kind === 'flip' ? magmaOf : signedOf);
       const mean = values.reduce((sum, value) => sum + value, 0) / values.length;
       const against = this.compare.other ? 'picture B' : 'the reference';
       this.say(kind === 'flip' ? `FLIP against ${against}: mean ${mean.toFixed(4)}; black 0, yellow 1` : `Against ${against}: red is brighter, blue is darker, black is equal`);
+      this.draw(picture, values, kind === 'flip' ? magmaOf : signedOf);
     } catch (error) {
       this.say((error as Error).message);
     } finally {
@@ -87,9 +91,11 @@ export class Difference {
     }
   }
 
+  /** Tells something; a map that is older than the words is taken away. */
   private say(text: string): void {
     this.words.textContent = text;
     this.words.hidden = false;
+    this.canvas.hidden = true;
   }
 
   private draw({ width, height }: Picture, values: Float32Array, color: (value: number) => Rgb): void {

@@ -68,9 +68,10 @@ class Track {
     this.frames = 0;
   }
 
-  private async observe({ count, milliseconds, complete }: Sample): Promise<void> {
+  private async observe({ count, milliseconds, width, height, complete }: Sample): Promise<void> {
     const reference = this.reference();
-    if (!reference) return;
+    // A picture of another size is about to be resized.
+    if (reference?.width !== width || reference.height !== height) return;
     const begins = count <= this.frames || this.curves.length === 0;
     this.milliseconds = count <= this.frames ? milliseconds : this.milliseconds + milliseconds;
     this.frames = count;
@@ -137,6 +138,7 @@ export class ErrorMeter {
   private forget(): void {
     if (!this.kept) return;
     this.kept = undefined;
+    this.view.forgetReference();
     this.show('The camera or the scene has changed: keep a new reference.');
   }
 

@@ -11,8 +11,20 @@ export function short(value: number): string {
   return size >= 1e4 || size < 1e-3 ? value.toExponential(1) : String(Number(value.toPrecision(3)));
 }
 
-/** The reservoir that was shaded: the last that a pass left. */
-export const lastResult = ({ notes }: Inspection): Note | undefined => notes.filter(({ kind }) => kind === 'result').at(-1);
+/** p-hat W, where the sample is lit: what a reservoir gives. */
+const estimateOf = ({ is_visible: lit, sample, unbiased_contribution_weight: w }: Note) => (lit ? (sample?.target_value ?? 0) * w : 0);
+
+/** The reservoirs that were shaded: those that the last pass left. */
+function lastResults({ notes }: Inspection): Note[] {
+  const results = notes.filter(({ kind }) => kind === 'result');
+  return results.filter(({ stage }) => stage === results.at(-1)?.stage);
+}
+
+/** Of the reservoirs that were shaded the one that gives most. */
+export function lastResult(seen: Inspection): Note | undefined {
+  const [first, ...others] = lastResults(seen);
+  return first && others.reduce((most, note) => (estimateOf(note) > estimateOf(most) ? note : most), first);
+}
 
 const of = ({ notes }: Inspection, kind: Note['kind'], stage: string) => notes.filter((note) => note.kind === kind && note.stage === stage);
 
@@ -50,7 +62,8 @@ function whyWords(seen: Inspection, last: Note): string[] {
   const sample = last.sample;
   if (!sample) return ['Nothing was chosen: no candidate, and nothing that joined, carries light to this pixel. Direct light is black in this frame.'];
   const kind = sample.light_kind === 'triangle' ? 'a glowing triangle' : `the ${sample.light_kind} light`;
-  const chosen = `Light ${sample.light}, ${kind}, was chosen`;
+  const count = lastResults(seen).length;
+  const chosen = `Light ${sample.light}, ${kind}, was chosen${count > 1 ? ` by the one of ${count} reservoirs that gives most` : ''}`;
   if (last.unbiased_contribution_weight === 0) return [`${chosen}, and found to be in shadow: its weight is 0, and direct light is black in this frame.`];
   if (!last.is_visible) return [`${chosen}, and something stands between: direct light is black in this frame.`];
   const words = [`${chosen}; it is seen from here, and lights the pixel with p̂ · W = ${short(sample.target_value * last.unbiased_contribution_weight)}.`];
@@ -66,7 +79,7 @@ export function explainPixel(seen: Inspection): string[] {
   const words: string[] = [];
   if (luminance(seen.surface.emission) > 0) words.push('The surface shines itself; what it reflects comes on top.');
   const last = lastResult(seen);
-  if (!last) words.push('The technique keeps no notes on what it samples; RIS and ReSTIR DI do.');
+  if (!last) words.push('There are no notes on what was sampled: RIS and ReSTIR DI keep them, while the view is one of theirs.');
   else words.push(...whyWords(seen, last));
   return [...words, candidateWords(seen), historyWords(seen), ...neighbourWords(seen)].filter((text) => text !== undefined);
 }

@@ -64,8 +64,12 @@ export class Inspector {
     // Shift and an arrow go to the next pixel, before the camera takes the key.
     canvas.addEventListener('keydown', (event) => this.step(event), { capture: true });
     view.addEventListener('sample', ({ detail: { count, width, height } }) => {
+      const [before, across] = this.size;
       this.size = [width, height];
-      void this.read(count);
+      // The same place in a picture of another size.
+      if (this.pixel && (before !== width || across !== height)) {
+        void this.choose([Math.floor((this.pixel[0] * width) / before), Math.floor((this.pixel[1] * height) / across)]);
+      } else void this.read(count);
     });
     view.addEventListener('load', () => this.pixel && void this.choose(this.pixel));
     view.addEventListener('restored', () => this.pixel && void this.choose(this.pixel));
@@ -116,8 +120,9 @@ export class Inspector {
     } catch {
       return;
     }
+    this.readingSince = -Infinity;
     // A picture that stands still needs another frame for it.
-    this.view.step();
+    this.view.renderFrame();
   }
 
   private async read(count: number): Promise<void> {
@@ -127,7 +132,7 @@ export class Inspector {
     this.readingSince = now;
     const seen = await this.view.inspection().catch(() => undefined);
     if (!seen || !this.pixel || seen.pixel[0] !== this.pixel[0] || seen.pixel[1] !== this.pixel[1]) return;
-    this.frames = [...this.frames.filter((frame) => frame.count < count), { count, seen }].slice(-mostFrames);
+    this.frames = [...this.frames, { count, seen }].slice(-mostFrames);
     this.show();
     this.draw();
   }

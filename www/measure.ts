@@ -36,11 +36,15 @@ function start(): Worker {
     if (failure) asked?.reject(failure);
     else asked?.resolve(result);
   };
-  made.onerror = (event) => {
+  const fail = (event: Event) => {
+    made.terminate();
     worker = undefined;
-    for (const { reject } of waiting.values()) reject({ code: 'WORKER', message: event.message || 'pictures could not be compared' });
+    const message = (event instanceof ErrorEvent && event.message) || 'pictures could not be compared';
+    for (const { reject } of waiting.values()) reject({ code: 'WORKER', message });
     waiting.clear();
   };
+  made.onerror = fail;
+  made.onmessageerror = fail;
   return made;
 }
 

@@ -36,8 +36,10 @@ export class Recording {
     if (!context || !view.scene) return;
     [canvas.width, canvas.height] = view.size;
     const paint = () => view.drawOn(context).then(() => this.compare.drawOn(context)).catch(() => undefined);
-    // A recorder begins with what the canvas has: that shall be a picture.
+    // A recorder begins with what the canvas has: that shall be a picture. A second press meanwhile is none.
+    this.videoButton.disabled = true;
     await paint();
+    this.videoButton.disabled = false;
     let video: Video;
     try {
       video = Video.of(canvas);
@@ -82,8 +84,13 @@ export class Recording {
     this.picturesButton.textContent = 'Cancel';
     const start = view.settings.time;
     const entries: ZipEntry[] = [];
+    const { scene } = view;
+    const { size } = view.settings;
     try {
+      // All pictures are of one size.
+      await view.setSize(view.size);
       for (let at = 0; at < count && !signal.aborted; at++) {
+        if (view.scene !== scene || view.loading) throw { code: 'CANCELLED', message: 'Another scene was chosen: no pictures were saved.' };
         this.words.textContent = `Picture ${at + 1} of ${count}`;
         const png = await view.renderAt(start + at / rate, samples);
         entries.push({ name: `${this.name()}-${String(at).padStart(4, '0')}.png`, bytes: new Uint8Array(await png.arrayBuffer()) });
@@ -96,8 +103,9 @@ export class Recording {
     } finally {
       this.pictures = undefined;
       this.picturesButton.textContent = 'Save pictures';
-      // Back to the moment that was shown.
-      await view.show(view.settings, view.scene).catch(() => undefined);
+      await view.setSize(size).catch(() => undefined);
+      // Back to the moment that was shown, unless something else was asked for.
+      if (view.scene === scene && !view.loading) await view.show(view.settings, view.scene).catch(() => undefined);
     }
   }
 }

@@ -123,7 +123,8 @@ function checkRange(name: string, value: number, low: number, high: number, whol
  * Renders a scene to a canvas, as large as the canvas is shown. Nothing is fetched before the first `load`.
  *
  * Methods that change the picture take effect between two frames, and wait for the first scene where there is none yet. Each
- * failure is one `error` event, and rejects the method's promise with a `RestirError`; that need not be caught.
+ * failure of theirs is one `error` event, and rejects the method's promise with a `RestirError`; that need not be caught. Methods that only
+ * read reject without an event.
  */
 export class RestirViewer extends EventTarget {
   /** What determines the picture: to be read, and changed by the methods. */
@@ -152,6 +153,7 @@ export class RestirViewer extends EventTarget {
   private moment = 0;
   /** When devices were lost. */
   private losses: number[] = [];
+  private halted = false;
   private kept: Picture | undefined;
   private inspected: [number, number] | undefined;
   private ended = false;
@@ -506,6 +508,16 @@ export class RestirViewer extends EventTarget {
     this.loop.step();
   }
 
+  /** Renders one frame more, also of a picture that is paused or complete. */
+  renderFrame(): void {
+    this.loop.step();
+  }
+
+  /** Whether the renderer has stopped after a failure: see `restore`. */
+  get stopped(): boolean {
+    return this.halted;
+  }
+
   /** While true nothing is rendered, because nobody sees it. A hidden tab does that by itself. */
   get suspended(): boolean {
     return this.loop.suspended;
@@ -603,6 +615,7 @@ export class RestirViewer extends EventTarget {
   /** Keeps the averaged picture as `reference`, and its size in pixels from now on, for only alike ones are compared. */
   keepReference(): Promise<void> {
     return this.reported(async () => {
+      this.kept = undefined;
       this.kept = await this.readPicture();
       await this.setSize([...this.rendered]);
     });
@@ -613,10 +626,18 @@ export class RestirViewer extends EventTarget {
     return this.kept;
   }
 
+  /** Lets go of it, as of one that shows something else. */
+  forgetReference(): void {
+    this.kept = undefined;
+  }
+
   /** How far the picture is from a reference. Rejects with `BAD_VALUE` where there is none, or one of another size. */
   async errors(reference = this.kept): Promise<Errors> {
     if (!reference) throw invalid('There is no reference yet.');
-    return errorsOf(await this.readPicture(), reference);
+    const picture = await this.readPicture();
+    return errorsOf(picture, reference).catch((thrown: unknown) => {
+      throw new RestirError(toFailure(thrown));
+    });
   }
 
   /** Which settings, as they are now, bias the picture. */
@@ -646,19 +667,26 @@ export class RestirViewer extends EventTarget {
         const [width, height] = this.rendered;
         const passes = JSON.parse(viewer.dissect()) as { id: string; file: string; has_picture: boolean }[];
         const dissected: DissectedPass[] = [];
-        for (const [index, { id, file, has_picture: hasPicture }] of passes.entries()) {
-          const bytes = hasPicture ? ((await viewer.dissected(index)) as Uint8Array) : undefined;
-          dissected.push({ id, file, picture: bytes && new ImageData(Uint8ClampedArray.from(bytes), width, height) });
+        try {
+          for (const [index, { id, file, has_picture: hasPicture }] of passes.entries()) {
+            const bytes = hasPicture ? ((await viewer.dissected(index)) as Uint8Array) : undefined;
+            dissected.push({ id, file, picture: bytes && new ImageData(Uint8ClampedArray.from(bytes), width, height) });
+          }
+        } finally {
+          viewer.forget_dissection();
         }
-        viewer.forget_dissection();
         return dissected;
       }),
     );
   }
 
   /** Runs work on the wasm module's own viewer between two frames; for what has no method here. */
-  call<T>(work: (viewer: Viewer) => T | Promise<T>): Promise<T> {
-    return this.loop.call(work);
+  async call<T>(work: (viewer: Viewer) => T | Promise<T>): Promise<T> {
+    try {
+      return await this.loop.call(work);
+    } catch (thrown) {
+      throw new RestirError(toFailure(thrown));
+    }
   }
 
   // Beginning and end
@@ -814,6 +842,7 @@ export class RestirViewer extends EventTarget {
       throw disposed();
     }
     this.viewer = viewer;
+    this.halted = false;
     this.rendered = size;
     Object.assign(this.settings, view);
     take?.(viewer);
@@ -956,6 +985,8 @@ export class RestirViewer extends EventTarget {
       this.cover(viewer, width);
       viewer.resize(width, height);
       this.rendered = [width, height];
+      // Time that runs goes on from where it is.
+      if (!this.accumulating) viewer.set_time(this.moment);
     }
     return moved || resized;
   }
@@ -1003,6 +1034,7 @@ export class RestirViewer extends EventTarget {
 
   /** The renderer is gone, and with it all that waits for it. */
   private halt(failure: Failure): void {
+    this.halted = true;
     this.loop.stop(new RestirError(failure));
     this.emit('error', { ...failure, stopped: true });
   }

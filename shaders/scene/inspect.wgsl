@@ -6,6 +6,7 @@
 @compute @workgroup_size(1)
 fn main() {
     trace.head.count = 0u;
+    trace.head.dropped = 0u;
     trace.head.instance = NONE;
     if any(inspected.pixel >= frame.size) || !pixel_has_surface(inspected.pixel) {
         return;

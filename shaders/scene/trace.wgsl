@@ -35,10 +35,10 @@ struct Inspected {
 
 // What the pixel shows.
 struct TraceHead {
-    count: u32, // of notes, also those that there was no room for
+    count: u32, // of notes
     instance: u32, // NONE where there is no surface
     triangle: u32,
-    padding_0: u32,
+    dropped: u32, // notes that there was no room for
     position: vec3f, // world space
     depth: f32, // along the view axis, metres
     normal: vec3f, // world space, shading

@@ -83,6 +83,9 @@ pub(crate) fn biases_that_hold(all: &[(bool, &'static str, &'static str)]) -> Ve
     all.iter().filter(|(holds, ..)| *holds).map(|&(_, parameter, why)| Bias { parameter, why }).collect()
 }
 
+/// The parameter that only paths obey.
+pub(crate) const MAX_DEPTH: &str = "render.max_depth";
+
 /// What darkens every technique that draws indirect light only if it is asked to.
 pub(crate) const NO_INDIRECT: &str = "light that scatters more than once is left out";
 
@@ -103,6 +106,11 @@ pub trait Technique {
     /// Which of its settings, as they are now, bias the picture; those of all techniques are in [`RenderParams::biases`].
     fn biases(&self) -> Vec<Bias> {
         Vec::new()
+    }
+
+    /// Whether a parameter of all techniques, `render.NAME`, does anything as it is set now.
+    fn obeys(&self, _parameter: &str) -> bool {
+        true
     }
 
     /// Makes buffers for a picture size; called before the first frame and whenever size or parameters changed.

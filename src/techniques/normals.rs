@@ -43,6 +43,9 @@ impl Technique for Normals {
     fn values(&self) -> serde_json::Value {
         self.params.values()
     }
+    fn obeys(&self, _parameter: &str) -> bool {
+        false
+    }
     fn prepare(&mut self, gpu: &Gpu, _size: UVec2) -> Result<()> {
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&self.params));
         Ok(())

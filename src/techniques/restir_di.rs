@@ -1,7 +1,7 @@
 //! `restir-di`: spatiotemporal reservoir resampling of direct light, as Bitterli et al. 2020 with the switches of thesis
 //! 001, section 5.1.
 
-use super::{Bias, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold, candidates, reuse};
+use super::{Bias, MAX_DEPTH, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold, candidates, reuse};
 use crate::error::Result;
 use crate::gpu::{Gpu, recorder::Recorder, shader::table};
 use crate::params::Params;
@@ -215,6 +215,10 @@ impl Technique for RestirDi {
         ])
     }
 
+    fn obeys(&self, parameter: &str) -> bool {
+        parameter != MAX_DEPTH || self.params.indirect == 1
+    }
+
     fn prepare(&mut self, gpu: &Gpu, size: UVec2) -> Result<()> {
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&self.params));
         let direct_only = RestirDiParams { indirect: 0, ..self.params };
@@ -281,7 +285,6 @@ impl Technique for RestirDi {
             recorder
                 .pass(&table::RESTIR_DI_TEMPORAL)
                 .inspected_by(&table::RESTIR_DI_INSPECT_TEMPORAL)
-                .inspected_by(&table::RESTIR_DI_INSPECT_TEMPORAL)
                 .bind("params", &self.uniform)
                 .bind("reservoirs", &reservoirs[current])
                 .bind("reservoirs_previous", &reservoirs[history])
@@ -306,8 +309,6 @@ impl Technique for RestirDi {
             for pass_index in self.pass_indices.iter().take(self.params.spatial_iterations as usize) {
                 recorder
                     .pass(&table::RESTIR_DI_SPATIAL)
-                    .inspected_by(&table::RESTIR_DI_INSPECT_SPATIAL)
-                    .inspected_by(&table::RESTIR_DI_INSPECT_SPATIAL)
                     .inspected_by(&table::RESTIR_DI_INSPECT_SPATIAL)
                     .bind("params", &self.uniform)
                     .bind("pass_index", pass_index)

@@ -1,6 +1,6 @@
 //! `restir-di-decoupled`: the production pipeline of Wyman and Panteleev 2021, light tiles and decoupled shading.
 
-use super::{Bias, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold};
+use super::{Bias, MAX_DEPTH, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, recorder::Recorder, shader::table};
 use crate::params::Params;
@@ -233,6 +233,10 @@ impl Technique for RestirDiDecoupled {
             (self.params.checkerboard == 1, "checkerboard", "shadows lag by a frame in every other pixel"),
             (self.params.indirect == 0, "indirect", NO_INDIRECT),
         ])
+    }
+
+    fn obeys(&self, parameter: &str) -> bool {
+        parameter != MAX_DEPTH || self.params.indirect == 1
     }
 
     fn prepare(&mut self, gpu: &Gpu, size: UVec2) -> Result<()> {

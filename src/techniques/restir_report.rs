@@ -1,6 +1,6 @@
 //! `restir-report`: the system of report 003, with its faults as switches beside the corrected form.
 
-use super::{Bias, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold};
+use super::{Bias, MAX_DEPTH, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold};
 use crate::error::Result;
 use crate::gpu::{Gpu, recorder::Recorder, shader::table};
 use crate::params::Params;
@@ -153,6 +153,10 @@ impl Technique for RestirReport {
             ),
             (self.params.indirect == 0, "indirect", NO_INDIRECT),
         ])
+    }
+
+    fn obeys(&self, parameter: &str) -> bool {
+        parameter != MAX_DEPTH || self.params.indirect == 1
     }
 
     fn prepare(&mut self, gpu: &Gpu, size: UVec2) -> Result<()> {

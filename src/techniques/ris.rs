@@ -1,6 +1,6 @@
 //! `ris`: resampled importance sampling of direct light, no reuse.
 
-use super::{Technique, TechniqueInfo, candidates};
+use super::{MAX_DEPTH, Technique, TechniqueInfo, candidates};
 use crate::error::Result;
 use crate::gpu::{Gpu, recorder::Recorder, shader::table};
 use crate::params::Params;
@@ -52,6 +52,9 @@ impl Technique for Ris {
     }
     fn values(&self) -> serde_json::Value {
         self.params.values()
+    }
+    fn obeys(&self, parameter: &str) -> bool {
+        parameter != MAX_DEPTH
     }
     fn prepare(&mut self, gpu: &Gpu, _size: UVec2) -> Result<()> {
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&self.params));

@@ -171,7 +171,7 @@ test('errors against a reference are those of the command line, are drawn, and e
     const csv = await page.evaluate(() => window.saved);
     const [name, , , mse] = lastOf(csv);
     assert.equal(name, '"ris render.max_depth=1"');
-    assert.match(csv, /^series,frames,milliseconds,mse,relmse,mape,bias\n"path-tracer/);
+    assert.match(csv, /^series,frames,milliseconds,mse,relmse,mape,bias,flip\n"path-tracer/);
     const common = ['--size', '24x16', '--frames', '64', '--set', 'render.max_depth=1'];
     const native = await compareNatively('builtin:cornell', [...common, '--technique', 'ris'], [...common, '--technique', 'path-tracer']);
     assert.ok(Math.abs(Number(mse) / native.mse - 1) < 0.05, `${mse} here, ${native.mse} there`);
@@ -209,7 +209,7 @@ test('two pictures side by side: their own settings, one camera, a divider, and 
 
     // What is seen: A left of the divider, B right of it.
     const row = async () => {
-      const { rgb } = decodePng(Buffer.from(await page.screenshot({ clip: { x: 0, y: 300, width: 400, height: 1 } })));
+      const { rgb } = decodePng(Buffer.from(await page.screenshot({ clip: { x: 0, y: 200, width: 400, height: 1 } })));
       return (x) => [...rgb.subarray(3 * x, 3 * x + 3)].join();
     };
     const places = [150, 390];

@@ -22,12 +22,17 @@ fn observe_begin(stage: u32) -> bool {
     return true;
 }
 
+// Notes that candidates leave room for: what became of them matters more than any one of them.
+const RESERVED_NOTES = 512u;
+
 fn observe(given: Observation) {
+    let room = inspected.capacity - select(0u, RESERVED_NOTES, given.kind == OBSERVATION_CANDIDATE);
     let at = trace.head.count;
-    trace.head.count += 1u;
-    if at >= inspected.capacity {
+    if at >= room {
+        trace.head.dropped += 1u;
         return;
     }
+    trace.head.count += 1u;
     var note = given;
     note.stage = observed_stage;
     if note.light != NONE {
