@@ -178,9 +178,10 @@ test('errors against a reference are those of the command line, are drawn, and e
     assert.match(await told(), /MSE\s+\d\.\d\de-\d/);
     assert.equal(await page.$$eval('#errors-plot polyline', (lines) => lines.length), 2);
 
-    await page.mouse.move(100, 100);
+    // Above what the errors cover.
+    await page.mouse.move(100, 20);
     await page.mouse.down();
-    await page.mouse.move(140, 110, { steps: 2 });
+    await page.mouse.move(140, 30, { steps: 2 });
     await page.mouse.up();
     await page.waitForFunction(() => document.getElementById('errors-words').innerText.includes('camera'), { polling: 50 });
     assert.equal(await told(), '');
