@@ -100,12 +100,27 @@ const states = [
     await page.click('#compare');
     await page.waitForFunction(() => document.getElementById('label-b').textContent !== '', { polling: 50 });
   }],
+  ['inspector', async (page) => {
+    await page.evaluate(() => {
+      document.getElementById('compare').click();
+      document.getElementById('inspect').click();
+    });
+    await page.waitForFunction(() => document.querySelector('#inspector details'), { polling: 50 });
+    await page.evaluate(() => document.querySelectorAll('#inspector details').forEach((details) => (details.open = true)));
+  }],
+  ['a frame pass by pass', async (page) => {
+    await page.evaluate(() => {
+      document.getElementById('inspect').click();
+      document.getElementById('dissect').click();
+    });
+    await page.waitForFunction(() => document.getElementById('steps-source').textContent.includes('One invocation'), { polling: 50 });
+  }],
   ['message', (page) => page.evaluate(async () => (await import(new URL('notices.js', location.href).href)).showError({ code: 'IO', message: 'a file' }))],
   ['loading', (page) =>
     page.evaluate(async () => {
       const { clearError, showProgress } = await import(new URL('notices.js', location.href).href);
       clearError();
-      showProgress(0.5, 'Loading');
+      showProgress('textures', 0.5, 'Loading');
     })],
   ['help', (page) => page.$eval('#help', (help) => help.showModal())],
 ];

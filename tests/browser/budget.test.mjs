@@ -107,7 +107,7 @@ test('on the page: coarse while the camera moves, the sharp picture comes throug
     await page.mouse.up();
     assert.ok(coarse < still, `${coarse} pixels in motion`);
     await page.waitForFunction((sharp) => document.getElementById('status').textContent.includes(`${sharp}×`), { polling: 20 }, still);
-    await page.waitForFunction(() => document.querySelectorAll('main canvas').length === 1, { polling: 50 });
+    await page.waitForFunction(() => document.querySelectorAll('main canvas:not([id])').length === 0, { polling: 50 });
     const overlays = await page.evaluate(() => overlays);
     assert.ok(overlays.length >= 1 && overlays.every((overlay) => overlay.width < still && overlay.colours > 10), JSON.stringify(overlays));
 
