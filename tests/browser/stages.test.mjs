@@ -73,7 +73,7 @@ async function slowServer(bytes) {
     const pieces = body.length > 10_000 ? 8 : 1;
     for (let at = 0; at < pieces; at++) {
       response.write(body.subarray((at * body.length) / pieces, ((at + 1) * body.length) / pieces));
-      await new Promise((resolve) => setTimeout(resolve, 120));
+      await new Promise((resolve) => setTimeout(resolve, 300));
     }
     response.end();
   });
@@ -98,8 +98,11 @@ test('a download is told in bytes of all bytes, and can be cancelled', async () 
 
     await page.select('#scene', 'cornell');
     await page.waitForFunction(() => document.getElementById('loading').hidden && !location.search.includes('gltf'), { polling: 50 });
-    await page.evaluate(() => history.back());
-    await page.waitForFunction(() => / of 4\.0 MB/.test(document.getElementById('loading-text').textContent), { polling: 20 });
+    await page.evaluate(() => {
+      window.seen = [];
+      history.back();
+    });
+    await page.waitForFunction(() => window.seen.some(({ text }) => / of 4\.0 MB/.test(text)), { polling: 20 });
     await page.click('#cancel');
     await page.waitForFunction(() => document.getElementById('loading').hidden, { polling: 50 });
     // The address is again that of what is shown.
