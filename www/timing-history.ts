@@ -20,7 +20,7 @@ export class TimingHistory {
   private readonly cursor = svg('line', { y1: 0, y2: height, class: 'cursor', visibility: 'hidden' });
   private readonly chart = svg('svg', {
     viewBox: `0 0 ${width} ${height}`, preserveAspectRatio: 'none', tabindex: 0, role: 'slider',
-    'aria-label': 'Readings of the last minute', 'aria-valuemin': 1,
+    'aria-label': 'Readings of the last minute', 'aria-valuemin': 1, 'aria-valuenow': 1,
   });
   private readonly words = document.createElement('figcaption');
 
