@@ -18,6 +18,16 @@ async function drag(page, x, y) {
   await page.mouse.move(100 + x, 200 + y, { steps: 3 });
   await page.mouse.up();
   await chosen(page, 'moved');
+  // The last step of the drag may come frames after the first.
+  await page.waitForFunction(
+    async () => {
+      const camera = await window.restir.call((viewer) => viewer.camera());
+      const rests = camera === window.lastCamera;
+      window.lastCamera = camera;
+      return rests;
+    },
+    { polling: 300 },
+  );
 }
 
 /** The picture, once what was asked for is in it. */

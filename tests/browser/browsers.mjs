@@ -1,5 +1,6 @@
 // Starts the browser under test with the switches that work without a GPU.
-import { mkdtempSync, rmSync } from 'node:fs';
+import { mkdtempSync } from 'node:fs';
+import { rm } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import puppeteer from 'puppeteer-core';
@@ -49,7 +50,8 @@ export async function launch() {
   const browser = await launchers[browserName](profile);
   const close = async () => {
     await browser.close();
-    rmSync(profile, { recursive: true, force: true, maxRetries: 5, retryDelay: 200 });
+    // The browser's last process may write a little longer.
+    await rm(profile, { recursive: true, force: true, maxRetries: 20, retryDelay: 250 });
   };
   return { browser, close };
 }
