@@ -1,7 +1,7 @@
 // The pixel inspector, a frame pass by pass, maps of difference, marks of bias, focus: with real clicks and keys.
 import { strict as assert } from 'node:assert';
 import { after, before, test } from 'node:test';
-import { openSite, readDisplay, waitForFrames, withPage } from './pages.mjs';
+import { openSite, readDisplay, unfold, waitForFrames, withPage } from './pages.mjs';
 
 let site;
 before(async () => (site = await openSite()));
@@ -127,7 +127,7 @@ test('a frame pass by pass: pictures, equations and sources of each', () =>
 test('maps of difference: against the reference, and against picture B', () =>
   open('?scene=cornell&size=32x24&technique=path-tracer&render.max_depth=1&frames=4', async (page) => {
     await waitForFrames(page, 4);
-    await page.click('#errors summary');
+    await unfold(page, 'errors');
     await page.select('#difference', 'flip');
     await page.waitForFunction(() => document.getElementById('difference-words').textContent.includes('Keep a reference'), { polling: 50 });
     await page.click('#keep-reference');

@@ -95,3 +95,6 @@ export async function withPage(site, query, work, before) {
     await page.close();
   }
 }
+
+/** Opens or closes what folds in the footer. The status line beside it changes its width, and a click by place may miss. */
+export const unfold = (page, id) => page.$eval(`#${id} summary`, (summary) => summary.click());

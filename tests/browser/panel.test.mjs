@@ -3,7 +3,7 @@ import { strict as assert } from 'node:assert';
 import { after, before, test } from 'node:test';
 import { compareNatively, renderNatively } from './native.mjs';
 import { decodePng } from './png.mjs';
-import { assertNoProblems, openPage, openSite, readDisplay, waitForFrames, waitForMessage, withPage } from './pages.mjs';
+import { assertNoProblems, openPage, openSite, readDisplay, unfold, waitForFrames, waitForMessage, withPage } from './pages.mjs';
 
 let site;
 before(async () => (site = await openSite()));
@@ -91,7 +91,7 @@ test('? lists the keys, and Escape closes the list', () =>
 
 test('passes are listed with their times, or it is said that they cannot be', () =>
   open('?scene=cornell&size=24x16', async (page) => {
-    await page.click('#timing summary');
+    await unfold(page, 'timing');
     // The first frame has no temporal pass.
     await waitForFrames(page, 3);
     const passes = await page.evaluate(async () => JSON.parse(await window.restir.call((viewer) => viewer.stats())).passes.map(({ name }) => name));
@@ -148,7 +148,7 @@ test('errors against a reference are those of the command line, are drawn, and e
   open('?scene=cornell&technique=path-tracer&size=24x16&frames=64&render.max_depth=1', async (page) => {
     const told = () => page.$eval('#errors-table', (table) => table.innerText);
     await waitForFrames(page, 64);
-    await page.click('#errors summary');
+    await unfold(page, 'errors');
     await page.click('#keep-reference');
     // The same frames again end at the picture itself.
     await page.waitForFunction(() => document.getElementById('errors-table').innerText.includes('0.00e+0'), { polling: 50 });

@@ -5,7 +5,7 @@ import { mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'n
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { openPage, openSite, readDisplay, waitForFrames, waitForMessage, withPage } from './pages.mjs';
+import { openPage, openSite, readDisplay, unfold, waitForFrames, waitForMessage, withPage } from './pages.mjs';
 import { decodePng } from './png.mjs';
 
 let site;
@@ -60,7 +60,7 @@ test('the pictures of an animation are those of their moments, and the page goes
   open('?scene=motion&technique=path-tracer&render.max_depth=1&size=32x24&time=0.5&accumulate=yes&frames=2&seed=3', async (page) => {
     await waitForFrames(page, 2);
     const before = await readDisplay(page);
-    await page.click('#recording summary');
+    await unfold(page, 'recording');
     await fill(page, 'record-count', '');
     await page.click('#record-pictures');
     assert.match(await page.$eval('#record-words', (words) => words.textContent), /must be numbers/);
@@ -99,7 +99,7 @@ test('the pictures of an animation are those of their moments, and the page goes
 
 test('a video is a WebM file with moving pictures in it', () =>
   open('?scene=motion&technique=normals&size=64x48', async (page) => {
-    await page.click('#recording summary');
+    await unfold(page, 'recording');
     await page.click('#record-video');
     await page.waitForFunction(() => /^Stop, ([3-9]|\d\d) s$/.test(document.getElementById('record-video').textContent), { polling: 50 });
     assert.equal(await page.$eval('#record-video', (button) => button.ariaPressed), 'true');
@@ -139,7 +139,7 @@ test('where the browser records no video it says so', () =>
   open(
     '?scene=cornell&technique=normals&size=16x16&frames=1',
     async (page) => {
-      await page.click('#recording summary');
+      await unfold(page, 'recording');
       await page.click('#record-video');
       assert.match(await waitForMessage(page), /records no video/);
       assert.equal(await page.$eval('#record-video', (button) => button.textContent), 'Record video');

@@ -1,7 +1,7 @@
 // The history of readings in the list of passes.
 import { strict as assert } from 'node:assert';
 import { after, before, test } from 'node:test';
-import { assertNoProblems, openPage, openSite, waitForFrames } from './pages.mjs';
+import { assertNoProblems, openPage, openSite, unfold, waitForFrames } from './pages.mjs';
 
 let site;
 before(async () => (site = await openSite()));
@@ -23,7 +23,7 @@ test('readings are drawn, and told under the pointer and by keys', async () => {
   try {
     await page.setViewport({ width: 800, height: 600 });
     await waitForFrames(page, 3);
-    await page.click('#timing summary');
+    await unfold(page, 'timing');
     const most = () => page.$eval('#pass-history svg', (chart) => Number(chart.getAttribute('aria-valuemax')));
     const words = () => page.$eval('#pass-history figcaption', (caption) => caption.textContent);
     await page.waitForFunction(() => Number(document.querySelector('#pass-history svg').getAttribute('aria-valuemax')) >= 4, { polling: 50 });
