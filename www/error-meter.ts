@@ -1,5 +1,6 @@
 // How far the picture is from a reference that the user kept: figures, curves against frames or time, and CSV.
 import type { Errors } from './api.js';
+import { save } from './files.js';
 import type { Picture } from './measure.js';
 import { byId } from './notices.js';
 import { svgElement } from './overlay.js';
@@ -214,8 +215,6 @@ export class ErrorMeter {
       readings.map(({ frames, milliseconds, mse, relmse, mape, bias, flip }) => [quoted(name), frames, milliseconds.toFixed(3), mse, relmse, mape ?? '', bias ?? '', flip].join(',')),
     );
     const csv = ['series,frames,milliseconds,mse,relmse,mape,bias,flip', ...lines, ''].join('\n');
-    const href = URL.createObjectURL(new Blob([csv], { type: 'text/csv' }));
-    Object.assign(document.createElement('a'), { href, download: 'errors.csv' }).click();
-    setTimeout(() => URL.revokeObjectURL(href), 60_000);
+    save(new Blob([csv], { type: 'text/csv' }), 'errors.csv');
   }
 }

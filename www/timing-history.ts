@@ -1,24 +1,19 @@
 // The last minute of frames: the time of each pass as stacked areas, and the figures of one reading at a time.
 import { byId, withUnit } from './notices.js';
+import { svgElement } from './overlay.js';
 import { type Reading, layersOf } from './readings.js';
 
 /** So many readings are kept. */
 const most = 120;
 const [width, height] = [320, 90];
 
-function svg(tag: string, attributes: Record<string, string | number>): SVGElement {
-  const element = document.createElementNS('http://www.w3.org/2000/svg', tag);
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
-  return element;
-}
-
 export class TimingHistory {
   private readings: Reading[] = [];
   /** The reading that is looked at; undefined for the last one. */
   private chosen: number | undefined;
-  private readonly areas = svg('g', {});
-  private readonly cursor = svg('line', { y1: 0, y2: height, class: 'cursor', visibility: 'hidden' });
-  private readonly chart = svg('svg', {
+  private readonly areas = svgElement('g', {});
+  private readonly cursor = svgElement('line', { y1: 0, y2: height, class: 'cursor', visibility: 'hidden' });
+  private readonly chart = svgElement('svg', {
     viewBox: `0 0 ${width} ${height}`, preserveAspectRatio: 'none', tabindex: 0, role: 'slider',
     'aria-label': 'Readings of the last minute', 'aria-valuemin': 1, 'aria-valuenow': 1,
   });
@@ -70,7 +65,7 @@ export class TimingHistory {
       const below = floor.map((ms, at) => `${x(at)},${y(ms)}`).reverse();
       for (const [at, ms] of values.entries()) floor[at] = (floor[at] ?? 0) + ms;
       const above = floor.map((ms, at) => `${x(at)},${y(ms)}`);
-      return svg('polygon', { points: [...above, ...below].join(' '), class: `area pass-${Math.min(index, 7)}` });
+      return svgElement('polygon', { points: [...above, ...below].join(' '), class: `area pass-${Math.min(index, 7)}` });
     });
     this.areas.replaceChildren(...polygons);
     this.showReading(this.chosen ?? readings.length - 1, x, top);

@@ -1,28 +1,20 @@
 // The package where other tools and pages have it: bundled by Vite, and in frames.
 import { strict as assert } from 'node:assert';
 import { execFileSync } from 'node:child_process';
-import { cpSync, mkdirSync, mkdtempSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
-import { tmpdir } from 'node:os';
+import { mkdirSync, readdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { dist } from '../../scripts/build.mjs';
 import { root } from '../../scripts/environment.mjs';
-import { serve } from '../../scripts/serve.mjs';
-import { launch } from './browsers.mjs';
-import { assertNoProblems, openPage } from './pages.mjs';
+import { assertNoProblems, openEmbedding, openPage } from './pages.mjs';
 
 let folder;
 let site;
 before(async () => {
-  folder = mkdtempSync(join(tmpdir(), 'restir-bundle-'));
-  cpSync(dist, join(folder, 'restir'), { recursive: true });
-  const [{ browser, close: closeBrowser }, server] = await Promise.all([launch(), serve(folder, 0)]);
-  site = { browser, url: server.url, close: () => Promise.all([closeBrowser(), server.close()]) };
+  site = await openEmbedding();
+  ({ folder } = site);
 });
-after(async () => {
-  await site?.close();
-  rmSync(folder, { recursive: true, force: true });
-});
+after(() => site?.close());
 
 const element = '<restir-viewer src="builtin:cornell" technique="normals" scale="1" max-samples="1" style="width: 64px; height: 48px"></restir-viewer>';
 

@@ -1,27 +1,18 @@
 // The attribute `compare` of <restir-viewer>: two pictures with a divider in a page that is not restir's own.
 import { strict as assert } from 'node:assert';
-import { cpSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
-import { tmpdir } from 'node:os';
+import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { dist } from '../../scripts/build.mjs';
-import { serve } from '../../scripts/serve.mjs';
-import { launch } from './browsers.mjs';
-import { assertNoProblems, openPage } from './pages.mjs';
+import { assertNoProblems, openEmbedding, openPage } from './pages.mjs';
 import { decodePng } from './png.mjs';
 
 let folder;
 let site;
 before(async () => {
-  folder = mkdtempSync(join(tmpdir(), 'restir-compare-'));
-  cpSync(dist, join(folder, 'restir'), { recursive: true });
-  const [{ browser, close: closeBrowser }, server] = await Promise.all([launch(), serve(folder, 0)]);
-  site = { browser, url: server.url, close: () => Promise.all([closeBrowser(), server.close()]) };
+  site = await openEmbedding();
+  ({ folder } = site);
 });
-after(async () => {
-  await site?.close();
-  rmSync(folder, { recursive: true, force: true });
-});
+after(() => site?.close());
 
 const html = `<!doctype html>
 <style>body { margin: 20px; } restir-viewer { width: 200px; height: 100px; }</style>

@@ -1,28 +1,20 @@
 // <restir-viewer> and RestirViewer in pages that are not restir's own, and the npm package.
 import { strict as assert } from 'node:assert';
 import { execFileSync } from 'node:child_process';
-import { cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
-import { tmpdir } from 'node:os';
+import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { dist } from '../../scripts/build.mjs';
 import { root } from '../../scripts/environment.mjs';
-import { serve } from '../../scripts/serve.mjs';
-import { browserName, launch } from './browsers.mjs';
-import { assertNoProblems, contrast, openPage, readDisplay, waitForFrames } from './pages.mjs';
+import { browserName } from './browsers.mjs';
+import { assertNoProblems, contrast, openEmbedding, openPage, readDisplay, waitForFrames } from './pages.mjs';
 
 let folder;
 let site;
 before(async () => {
-  folder = mkdtempSync(join(tmpdir(), 'restir-embedding-'));
-  cpSync(dist, join(folder, 'restir'), { recursive: true });
-  const [{ browser, close: closeBrowser }, server] = await Promise.all([launch(), serve(folder, 0)]);
-  site = { browser, url: server.url, close: () => Promise.all([closeBrowser(), server.close()]) };
+  site = await openEmbedding();
+  ({ folder } = site);
 });
-after(async () => {
-  await site?.close();
-  rmSync(folder, { recursive: true, force: true });
-});
+after(() => site?.close());
 
 let pages = 0;
 

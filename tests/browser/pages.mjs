@@ -1,5 +1,8 @@
 // Opens the built page in the browser under test and looks at what it shows.
 import { strict as assert } from 'node:assert';
+import { cpSync, mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 import { serve } from '../../scripts/serve.mjs';
 import { dist } from '../../scripts/build.mjs';
 import { launch } from './browsers.mjs';
@@ -11,6 +14,18 @@ const patience = 60_000;
 export async function openSite() {
   const [{ browser, close: closeBrowser }, server] = await Promise.all([launch(), serve(dist, 0, '/some/where/')]);
   return { browser, url: server.url, close: () => Promise.all([closeBrowser(), server.close()]) };
+}
+
+/** The browser and a server of `folder`, an empty one of one's own, with the package in `restir/`. */
+export async function openEmbedding() {
+  const folder = mkdtempSync(join(tmpdir(), 'restir-embedding-'));
+  cpSync(dist, join(folder, 'restir'), { recursive: true });
+  const [{ browser, close: closeBrowser }, server] = await Promise.all([launch(), serve(folder, 0)]);
+  const close = async () => {
+    await Promise.all([closeBrowser(), server.close()]);
+    rmSync(folder, { recursive: true, force: true });
+  };
+  return { browser, url: server.url, folder, close };
 }
 
 /** Opens the page with `query`. `problems` collects console errors, exceptions and failed requests. `before` runs ahead of its scripts. */
