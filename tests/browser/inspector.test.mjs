@@ -20,9 +20,14 @@ const isHidden = (page, id) => page.$eval(`#${id}`, (element) => element.hidden)
 const inspectorSays = (page, ...parts) =>
   page.waitForFunction((wanted) => wanted.every((part) => document.getElementById('inspector').textContent.includes(part)), { polling: 50 }, parts);
 
-/** The rows of a table of the inspector, as arrays of numbers and words. */
-const rows = (page, id) =>
-  page.$$eval(`#inspector-${id} tbody tr`, (all) => all.map((row) => [...row.cells].map(({ textContent }) => (Number.isNaN(Number(textContent)) ? textContent : Number(textContent)))));
+/** The inspector's tables, as rows of numbers and words, and its marks in the picture: all of one reading, for the next may come between two questions. */
+const reading = (page) =>
+  page.evaluate(() => {
+    const value = (text) => (Number.isNaN(Number(text)) ? text : Number(text));
+    const rows = (id) => [...document.querySelectorAll(`#inspector-${id} tbody tr`)].map((row) => [...row.cells].map(({ textContent }) => value(textContent)));
+    const marks = (which) => document.querySelectorAll(`#marks ${which}`).length;
+    return { passes: rows('reservoirs'), joined: rows('spatial-1'), circles: marks('circle.neighbour'), chosen: marks('line:is(.chosen, .shadowed)') };
+  });
 
 test('a click on a pixel tells what the passes saw there, and the figures add up', () =>
   open('?scene=cornell&size=48x36&spatial_confidence_limit=1000&indirect=false', async (page) => {
@@ -32,20 +37,18 @@ test('a click on a pixel tells what the passes saw there, and the figures add up
     await inspectorSays(page, 'was chosen', 'Of 32 candidates', 'neighbour', 'history');
     const where = (await text(page, 'inspector-where')).match(/\d+/g).map(Number);
     assert.deepEqual(where, [Math.floor((560 - (1280 - 800 * (48 / 36)) / 2) / (800 / 36)), Math.floor(660 / (800 / 36))]);
-    const passes = await rows(page, 'reservoirs');
+    const { passes, joined, circles, chosen } = await reading(page);
     assert.deepEqual(passes.map(([name]) => name), ['initial', 'temporal', 'spatial 1']);
     for (const [, , w, , target, estimate] of passes) assert.ok(Math.abs(w * target - estimate) <= 0.02 * estimate + 1e-3, `${w} * ${target} = ${estimate}`);
     // W = sum of w over p-hat of what was chosen: of the neighbours that joined.
-    const joined = await rows(page, 'spatial-1');
     const [, , w, c, target] = passes[2];
     const sum = joined.reduce((total, row) => total + row[6], 0);
     assert.ok(Math.abs(w * target - sum) <= 0.03 * sum + 1e-3, `${w * target} and ${sum}`);
     const confidence = joined.reduce((total, row) => total + row[2], 0);
     assert.ok(Math.abs(c - confidence) <= 0.02 * confidence, `${c} and ${confidence}`);
     // As many circles as neighbours, and the chosen light is drawn, in colours that are not of the page's text.
-    const circles = await page.$$eval('#marks circle.neighbour', (all) => all.length);
     assert.equal(circles, joined.length - 1);
-    assert.ok((await page.$$eval('#marks line:is(.chosen, .shadowed)', (all) => all.length)) <= 1);
+    assert.ok(chosen <= 1);
     // The next pixel by keys; the panel closes, and with it the marks.
     await page.focus('#canvas');
     await page.keyboard.down('Shift');
