@@ -18,6 +18,7 @@ pub mod params;
 pub mod renderer;
 pub mod scene;
 pub mod techniques;
+pub mod view;
 #[cfg(target_arch = "wasm32")]
 pub mod web;
 

@@ -278,5 +278,11 @@ params! {
         exposure_mode: choice(0, ["fixed", "automatic"]),
         /// Curve from linear radiance to the screen: `linear` clips, `aces` and `agx` are filmic, `neutral` (Khronos PBR Neutral) keeps base colours true.
         tone_map: choice(3, ["linear", "aces", "agx", "neutral"]),
+        /// Colours of views that show a number: `viridis` and `magma` grow evenly brighter, `turbo` tells more steps apart.
+        color_map: choice(0, crate::view::COLOR_MAPS),
+        /// What views of a number show in the first colour; theirs alone where it is not below `range_high`.
+        range_low: float(0.0, -1000000000.0..=1000000000.0, ""),
+        /// What views of a number show in the last colour. Higher: more of the large numbers can be told apart.
+        range_high: float(0.0, -1000000000.0..=1000000000.0, ""),
     }
 }

@@ -16,13 +16,8 @@ use crate::scene::flat::environment;
 use crate::scene::stage::Stage;
 use crate::scene::{Camera, Environment, FlatScene};
 use crate::techniques::{self, Bias, Technique};
+use crate::view::{Scale, Shown, View, legend_json};
 use glam::{UVec2, Vec2};
-
-/// Debug views that every technique has; the first is the picture itself.
-pub const COMMON_VIEWS: &[&str] = &["radiance", "albedo", "normal", "depth", "motion"];
-
-/// `Frame::view` of the common views after the first, as `shaders/film/view.wgsl` numbers them.
-const FIRST_COMMON_VIEW: u32 = 1000;
 
 /// Value of `environment_sampling`.
 const ENVIRONMENT_BY_PYRAMID: u32 = 1;
@@ -89,7 +84,7 @@ pub struct Renderer {
     previous_camera: Option<Camera>,
     /// Whether the frame before ran the technique, so that it has a history.
     has_history: bool,
-    view: u32,
+    shown: Shown,
     seed: u32,
     accumulate: bool,
     frame_index: u32,
@@ -153,7 +148,7 @@ impl Renderer {
             followed: Some(0),
             previous_camera: None,
             has_history: false,
-            view: 0,
+            shown: Shown::PICTURE,
             seed: 0,
             accumulate: scene.rig.is_still(),
             frame_index: 0,
@@ -258,8 +253,9 @@ impl Renderer {
         let mut technique = (techniques::find(id)?.create)(&self.gpu);
         technique.prepare(&self.gpu, self.size())?;
         self.technique = technique;
-        if (1..FIRST_COMMON_VIEW).contains(&self.view) {
-            self.view = 0;
+        if matches!(self.shown, Shown::Own(_)) {
+            self.shown = Shown::PICTURE;
+            self.film.count_pixels(&self.gpu, false)?;
         }
         self.reset();
         Ok(())
@@ -323,25 +319,43 @@ impl Renderer {
     /// Shows a debug view, or `radiance`.
     ///
     /// # Errors
-    /// `UNKNOWN_NAME` listing the views there are.
+    /// `UNKNOWN_NAME` listing the views there are; `LIMIT` where there is no room for what it counts.
     pub fn set_view(&mut self, name: &str) -> Result<()> {
         let own = self.technique.info().views;
-        let common = COMMON_VIEWS.iter().position(|v| *v == name);
-        let technique = own.iter().position(|v| *v == name);
-        self.view = match (common, technique) {
-            (Some(0), _) => 0,
-            (Some(index), _) => FIRST_COMMON_VIEW + index as u32 - 1,
-            (None, Some(index)) => index as u32 + 1,
-            (None, None) => {
-                return Err(Error::Unknown {
-                    kind: "view",
-                    name: name.to_owned(),
-                    known: COMMON_VIEWS.iter().chain(own).copied().collect::<Vec<_>>().join(", "),
-                });
-            }
-        };
+        let shown = Shown::find(name, own)?;
+        self.film.count_pixels(&self.gpu, shown.view(own).counts)?;
+        self.shown = shown;
         self.restart_film = true;
         Ok(())
+    }
+
+    /// The view that is shown.
+    fn view(&self) -> &'static View {
+        self.shown.view(self.technique.info().views)
+    }
+
+    /// How its values become colours: in the range that `film` asks for, or that settings and scene give, or its own.
+    fn scale(&self) -> Scale {
+        let Scale::Number { unit, mut low, mut high, is_logarithmic } = self.view().scale else {
+            return self.view().scale;
+        };
+        if self.film_params.range_low < self.film_params.range_high {
+            (low, high) = (self.film_params.range_low, self.film_params.range_high);
+        } else if self.shown.is_depth() {
+            high = 4.0 * self.scene_radius();
+        } else if let Some(highest) = self.technique.highest(self.view().name) {
+            high = highest;
+        }
+        // Equal ratios have no beginning at 0.
+        if is_logarithmic {
+            low = low.max(1e-6 * high.abs());
+        }
+        Scale::Number { unit, low, high, is_logarithmic }
+    }
+
+    /// What the colours of the view mean, as [`legend_json`].
+    pub fn legend(&self) -> serde_json::Value {
+        legend_json(self.view(), self.scale(), self.film_params.color_map)
     }
 
     /// Moves the camera. The film starts again; the technique keeps its history and reprojects it.
@@ -473,7 +487,8 @@ impl Renderer {
         if size == self.size() {
             return Ok(());
         }
-        let film = Film::new(&self.gpu, size)?;
+        let mut film = Film::new(&self.gpu, size)?;
+        film.count_pixels(&self.gpu, self.view().counts)?;
         self.technique.prepare(&self.gpu, size)?;
         self.film = film;
         self.visibility = visibility_textures(&self.gpu, size);
@@ -544,9 +559,10 @@ impl Renderer {
         self.advance_time();
         self.prepare_environment();
         self.gpu.queue.write_buffer(&self.frame_uniform, 0, bytemuck::bytes_of(&self.frame()));
-        self.film.prepare(&self.gpu, &self.film_params, self.view != 0);
+        self.film.prepare(&self.gpu, &self.film_params, self.shown, self.scale());
 
         let restart = self.restart_film || !self.accumulate;
+        let counts = self.view().counts;
         let parity = (self.frame_index & 1) as usize;
         if let Some(timer) = &mut self.display_timer {
             timer.clear();
@@ -556,10 +572,10 @@ impl Renderer {
         if let Some((dissection, easel)) = dissection {
             recorder.dissect(dissection, easel);
         }
-        // Rays are counted by the frame, what was left out since the film began.
-        recorder.encoder.clear_buffer(&self.film.counters, 0, if restart { None } else { Some(4) });
+        self.film.clear_counters(&mut recorder, restart);
         self.gpu_scene.share(&mut recorder);
         self.render_params.specialise(&mut recorder.features);
+        recorder.features.counts_pixels = counts;
         self.film.share(&mut recorder);
         recorder.share("frame", &self.frame_uniform);
         if let Some(inspector) = &self.inspector {
@@ -573,16 +589,18 @@ impl Renderer {
         if let Some(pass) = recorder.illustration(&table::SCENE_SEEN) {
             pass.dispatch_over(size)?;
         }
-        if self.view >= FIRST_COMMON_VIEW {
+        if self.shown.runs_technique() {
+            self.technique.record(&mut recorder, size)?;
+        } else {
             record_auxiliary(&mut recorder, [&self.albedo_depth, &self.normal, &self.motion], size)?;
+        }
+        if self.shown.is_drawn_by_film() {
             recorder
                 .pass(&table::FILM_VIEW)
                 .bind("albedo_depth", &self.albedo_depth)
                 .bind("normal", &self.normal)
                 .bind("motion", &self.motion)
                 .dispatch_over(size)?;
-        } else {
-            self.technique.record(&mut recorder, size)?;
         }
         self.film.record_accumulate(&mut recorder, restart)?;
         if dissects {
@@ -596,8 +614,8 @@ impl Renderer {
         self.accumulated = if restart { 1 } else { self.accumulated + 1 };
         self.restart_film = false;
         self.previous_camera = Some(self.camera.clone());
-        // The common views run no technique, and leave its history as old as it was.
-        self.has_history = self.view < FIRST_COMMON_VIEW;
+        // Views of the surface run no technique, and leave its history as old as it was.
+        self.has_history = self.shown.runs_technique();
         self.frame_index = self.frame_index.wrapping_add(1);
         self.gpu.check()
     }
@@ -625,7 +643,7 @@ impl Renderer {
     /// # Errors
     /// `DEVICE` for an error the device has reported.
     pub fn render_display(&mut self) -> Result<()> {
-        self.film.prepare(&self.gpu, &self.film_params, self.view != 0);
+        self.film.prepare(&self.gpu, &self.film_params, self.shown, self.scale());
         let mut recorder = Recorder::new(&self.gpu, self.display_timer.as_mut());
         recorder.share("film", self.film.uniforms());
         self.film.record_display(&mut recorder, &self.film_params)?;
@@ -640,10 +658,15 @@ impl Renderer {
         Vec2::from_angle((degrees % 360.0).to_radians())
     }
 
+    /// Radius of a ball round the scene, in metres.
+    fn scene_radius(&self) -> f32 {
+        let [low, high] = self.scene.bounds;
+        0.5 * (high - low).length()
+    }
+
     fn frame(&self) -> Frame {
         let size = self.size();
         let camera = camera_view(&self.camera, size);
-        let [low, high] = self.scene.bounds;
         Frame {
             camera,
             previous_camera: self.previous_camera.as_ref().map_or(camera, |c| camera_view(c, size)),
@@ -657,8 +680,8 @@ impl Renderer {
             roulette_threshold: self.render_params.roulette_threshold,
             light_count: self.scene.lights.len() as u32,
             environment_light: environment_light(&self.scene),
-            view: self.view,
-            scene_radius: 0.5 * (high - low).length(),
+            view: self.shown.of_technique(),
+            scene_radius: self.scene_radius(),
             history: (self.has_history && !self.stage.is_renumbered()).into(),
             pixel_filter: self.render_params.pixel_filter,
             top_level: self.gpu_scene.top_level(),

@@ -6,6 +6,7 @@ use restir::lab::truth::Trial;
 use restir::params::{FilmParams, ParamKind, ParamSpec, Params, RenderParams};
 use restir::techniques::presets::{self, Preset};
 use restir::techniques::{self, TechniqueInfo};
+use restir::view::{COMMON_VIEWS, Scale, View};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -72,6 +73,21 @@ fn parameter_table(prefix: &str, specs: &[ParamSpec]) -> String {
     table
 }
 
+/// A Markdown table of views.
+fn view_table(views: &[View]) -> String {
+    let mut table = String::from("| view | shows | as |\n|---|---|---|\n");
+    for View { name, meaning, scale, .. } in views {
+        let shown = match scale {
+            Scale::Radiance => "light, as the picture is".to_owned(),
+            Scale::Colors => "colours".to_owned(),
+            Scale::Number { unit, is_logarithmic: false, .. } => format!("a number, {unit}"),
+            Scale::Number { unit, .. } => format!("a number by magnitude, {unit}"),
+        };
+        table += &format!("| `{name}` | {meaning} | {shown} |\n");
+    }
+    table
+}
+
 /// A Markdown table of presets.
 fn preset_table() -> String {
     let mut table = String::from("| preset | technique | settings | stands for |\n|---|---|---|---|\n");
@@ -92,13 +108,13 @@ fn tables() -> Vec<(PathBuf, &'static str, &'static str, String)> {
     let mut tables = vec![
         (global.clone(), "parameters", "render", parameter_table("render.", RenderParams::SPECS)),
         (global.clone(), "parameters", "film", parameter_table("film.", FilmParams::SPECS)),
-        (global, "presets", "all", preset_table()),
+        (global.clone(), "presets", "all", preset_table()),
+        (global, "views", "common", view_table(COMMON_VIEWS)),
     ];
     tables.extend(techniques::ALL.iter().map(|info| {
-        let views = info.views.iter().map(|v| format!("`{v}`")).collect::<Vec<_>>().join(", ");
         let mut table = parameter_table("", info.params);
-        if !views.is_empty() {
-            table += &format!("\nDebug views of its own: {views}.\n");
+        if !info.views.is_empty() {
+            table += &format!("\nViews of its own:\n\n{}", view_table(info.views));
         }
         (technique_page(info), "parameters", info.id, table)
     }));

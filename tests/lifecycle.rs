@@ -5,7 +5,6 @@ mod support;
 
 use glam::{Mat4, Vec3};
 use restir::params::{FilmParams, ParamKind, ParamSpec, Params, RenderParams};
-use restir::renderer::COMMON_VIEWS;
 use restir::scene::flat::TextureArray;
 use restir::scene::{Camera, Environment, Instance, Material, Scene, builtin, shapes};
 use restir::{Error, FlatScene, Renderer, techniques};
@@ -161,20 +160,6 @@ fn techniques_switch_and_come_back() {
     }
     assert!(matches!(renderer.set_technique("nonesuch"), Err(Error::Unknown { .. })));
     assert_eq!(renderer.technique(), techniques::ALL[techniques::ALL.len() - 1].id);
-}
-
-#[test]
-fn every_view_of_every_technique_renders() {
-    for info in techniques::ALL {
-        // Lit by lights of every strategy, so that no view of one is black.
-        let mut renderer = renderer(&gpu(), support::builtin("cornell-64"), SIZE, info.id, &[]);
-        for view in COMMON_VIEWS.iter().chain(info.views) {
-            renderer.set_view(view).expect("a view");
-            let image = render_clean(&mut renderer, 2, &format!("{} as {view}", info.id));
-            assert!(mean(&image) > 0.0, "{} as {view} is black", info.id);
-        }
-        assert!(matches!(renderer.set_view("nonesuch"), Err(Error::Unknown { .. })));
-    }
 }
 
 /// Both ends of a range, or every choice.

@@ -9,6 +9,7 @@ use restir::gpu::shader::{SceneFeatures, Shader, table};
 use restir::gpu::shader_source::{Flattened, flatten, reflect};
 use restir::gpu::specialize::specialize;
 use restir::params::{FilmParams, ParamKind, Params, RenderParams};
+use restir::view::{COMMON_VIEWS, View};
 use restir::{Error, techniques};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -211,7 +212,12 @@ fn every_pass_opens_with_what_it_does() {
 
 /// The numbers of all `const {prefix}NAME = 0u;` lines of the shaders (test kernels number their operations), by NAME.
 fn enumeration(prefix: &str) -> BTreeMap<String, usize> {
-    let root = source_root().join("shaders");
+    enumeration_below("", prefix)
+}
+
+/// Those of the shaders in a folder.
+fn enumeration_below(folder: &str, prefix: &str) -> BTreeMap<String, usize> {
+    let root = source_root().join("shaders").join(folder);
     let mut found = BTreeMap::new();
     for file in files_below(&root, "wgsl").iter().filter(|file| !file.starts_with("tests/")) {
         let text = std::fs::read_to_string(root.join(file)).expect("readable");
@@ -267,6 +273,21 @@ fn shaders_number_choices_as_declared() {
     }
 }
 
+/// What a shader shows for a number is what the view of that number says.
+#[test]
+fn shaders_number_views_as_declared() {
+    let constant = |view: &View| view.name.replace(' ', "_").to_uppercase();
+    let expected = |views: &[View]| -> BTreeMap<_, _> {
+        views.iter().enumerate().map(|(i, view)| (constant(view), i + 1)).collect()
+    };
+    let numbered = |folder: &str| enumeration_below(folder, "VIEW_");
+    // The picture has no constant.
+    assert_eq!(numbered("film"), expected(&COMMON_VIEWS[1..]));
+    for info in techniques::ALL {
+        assert_eq!(numbered(&format!("techniques/{}", info.id)), expected(info.views), "{}", info.id);
+    }
+}
+
 fn refusal(result: restir::Result<()>) -> String {
     match result {
         Err(Error::Shader { shader, what }) => format!("{shader}: {what}"),
@@ -277,7 +298,7 @@ fn refusal(result: restir::Result<()>) -> String {
 #[test]
 fn wrong_bindings_are_refused_by_name() {
     let gpu = gpu();
-    let uniform = gpu.uniform("film", 32);
+    let uniform = gpu.uniform("film", std::mem::size_of::<restir::film::FilmUniforms>() as u64);
     let buffer = gpu.storage("buffer", 64).expect("fits");
     let texture = gpu.texture("texture", UVec2::ONE, wgpu::TextureFormat::Rgba32Float);
     let mut recorder = Recorder::new(&gpu, None);
@@ -295,7 +316,7 @@ fn wrong_bindings_are_refused_by_name() {
     let what = refusal(pass.bind("accumulation", &texture).dispatch([1, 1, 1]));
     assert!(what.contains("'accumulation' wants a buffer"), "{what}");
 
-    let counters = gpu.storage("counters", 16).expect("fits");
+    let counters = gpu.storage("counters", std::mem::size_of::<restir::film::Counters>() as u64).expect("fits");
     let pass = recorder.pass(&table::FILM_ACCUMULATE).bind("radiance", &texture).bind("counters", &counters);
     pass.bind("accumulation", &buffer).dispatch([1, 1, 1]).expect("all right now");
     recorder.submit();

@@ -22,8 +22,8 @@ export interface TechniqueInfo {
   /** False where its expected picture differs from the reference; `bias` says how. */
   unbiased: boolean;
   bias: string;
-  /** Names of what can be shown; the first is the picture itself. */
-  views: string[];
+  /** What can be shown, and what it says; the first is the picture itself. */
+  views: { name: string; meaning: string }[];
   params: Parameter[];
 }
 
@@ -113,6 +113,22 @@ export interface SceneReport {
 export interface Failure {
   code: string;
   message: string;
+}
+
+/** What the colours of a view mean, as it is shown now. */
+export interface ViewLegend {
+  name: string;
+  meaning: string;
+  /** Of a view that shows a number: what is counted or measured. */
+  unit?: string;
+  /** The number that gets the first colour. */
+  low?: number;
+  /** The number that gets the last colour. */
+  high?: number;
+  /** Whether equal ratios, rather than differences, are equally far apart. */
+  logarithmic?: boolean;
+  /** CSS colours at even steps from the low end to the high one. */
+  colors?: string[];
 }
 
 /** A setting that makes the expected picture differ from the truth, as it is now. */

@@ -9,6 +9,7 @@ import { Compare } from './compare.js';
 import { Difference } from './difference.js';
 import { ErrorMeter } from './error-meter.js';
 import { Inspector } from './inspector.js';
+import { Legend } from './legend.js';
 import { type Group, fillMenu, filterPanel, markBiases, showPanel } from './panel.js';
 import type { Contents, SceneSource } from './protocol.js';
 import { Recording } from './recording.js';
@@ -16,7 +17,6 @@ import { Steps } from './steps.js';
 import { TimeControls } from './time.js';
 import { showTiming } from './timing.js';
 import { TimingHistory } from './timing-history.js';
-import { legendOf } from './views.js';
 import { type Change, RestirViewer, type Sample, type Scene, type ViewerFailure } from './viewer.js';
 
 const defaultScene = 'cornell';
@@ -53,6 +53,14 @@ class App {
   private readonly cameras = new CameraMenu(this.view);
   /** Whose settings the panel shows. */
   private edited = this.view;
+  private readonly legend = new Legend(
+    () => this.edited,
+    (range) => {
+      const ends = ['film.range_low', 'film.range_high'];
+      const set = ends.map((key, at) => this.edited.setParam(key, range && String(range[at])));
+      void this.settled(Promise.all(set).then(() => undefined));
+    },
+  );
   private readonly time = new TimeControls({
     play: (on) => this.setAccumulate(!on),
     seek: (seconds) => this.view.setTime(seconds).catch(() => undefined),
@@ -249,6 +257,7 @@ class App {
     const changed = () => {
       this.showPresets();
       void this.showBiases();
+      void this.legend.update();
       this.showAccumulate(this.view.accumulating);
     };
     // What was refused is shown as it was.
@@ -270,8 +279,8 @@ class App {
     fillMenu(menu('scene'), this.scenes(), this.view.settings.scene ?? menu('scene').value);
     fillMenu(menu('technique'), (this.description?.techniques ?? []).map(({ id, title }) => [id, title]), settings.technique);
     this.showPresets();
-    fillMenu(menu('view'), (technique?.views ?? []).map((name) => [name, name]), settings.view);
-    this.showLegend();
+    fillMenu(menu('view'), (technique?.views ?? []).map(({ name }) => [name, name]), settings.view);
+    void this.legend.update();
     fillMenu(menu('scale'), scales, String(settings.scale ?? ''));
     this.showBudget();
     const summary = byId('summary', HTMLElement);
@@ -282,13 +291,6 @@ class App {
     showPanel(byId('panel', HTMLElement), this.groups(), settings.values, (key, value) => this.setParam(key, value));
     filterPanel(byId('panel', HTMLElement), byId('search', HTMLInputElement).value);
     void this.showBiases();
-  }
-
-  /** What the colours of the view say. */
-  private showLegend(): void {
-    const legend = byId('legend', HTMLElement);
-    legend.textContent = legendOf(this.edited.settings.view);
-    legend.hidden = legend.textContent === '';
   }
 
   /** Marks what biases the picture as it is now. */
@@ -338,7 +340,7 @@ class App {
     });
     const search = byId('search', HTMLInputElement);
     search.addEventListener('input', () => filterPanel(byId('panel', HTMLElement), search.value));
-    menu('view').addEventListener('change', () => void this.edited.setView(menu('view').value).then(() => this.showLegend(), () => this.showMenus()));
+    menu('view').addEventListener('change', () => void this.edited.setView(menu('view').value).then(() => this.legend.update(), () => this.showMenus()));
     menu('target').addEventListener('change', () => this.edit(menu('target').value));
     button('compare').addEventListener('click', () => (this.compare.other ? this.compare.close() : void this.openCompare()));
     menu('scale').addEventListener('change', () => void view.setScale(Number(menu('scale').value) || undefined));

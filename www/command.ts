@@ -9,7 +9,7 @@ const fileName = (address: string) => address.slice(address.lastIndexOf('/') + 1
 
 /** `restir render ...` for these settings, at a moment, a size in pixels and so many frames; files are called by their names. */
 export function commandLine(settings: Settings, sceneName: string, time: number, size: [number, number], frames: number): string {
-  const { scene, environment, technique, seed, accumulate, lights, animation, camera, pose, values } = settings;
+  const { scene, environment, technique, seed, accumulate, lights, animation, camera, pose, values, view } = settings;
   const words = ['restir', 'render', scene === undefined || /[./]/.test(scene) ? fileName(scene ?? sceneName) : `builtin:${scene}`];
   const put = (name: string, value: string | number | undefined) => value !== undefined && words.push(`--${name}`, String(value));
   put('scene-index', settings.sceneIndex);
@@ -25,6 +25,7 @@ export function commandLine(settings: Settings, sceneName: string, time: number,
   put('animation', animation === '0' ? undefined : animation);
   if (pose) put('pose', poseText(pose));
   else put('camera', camera === '0' ? undefined : camera);
+  put('view', view === 'radiance' ? undefined : view);
   put('accumulate', accumulate === undefined ? undefined : accumulate ? 'yes' : 'no');
   put('out', 'picture.png');
   return words.map(quoted).join(' ');

@@ -1,6 +1,6 @@
 // A scene on a canvas: loads it, renders it, moves its camera, and starts again when the device is lost. Knows no page.
 import { findAdapter } from './adapter.js';
-import type { BiasNote, Camera, Description, DissectedPass, Errors, Failure, Inspection, Pose, SceneReport, Stats } from './api.js';
+import type { BiasNote, Camera, Description, DissectedPass, Errors, Failure, Inspection, Pose, SceneReport, Stats, ViewLegend } from './api.js';
 import { OrbitCamera } from './camera.js';
 import { Controls } from './controls.js';
 import { description, isDefault, normalised, parameterOf, techniqueOf } from './description.js';
@@ -645,6 +645,11 @@ export class RestirViewer extends EventTarget {
     return this.call((viewer) => JSON.parse(viewer.biases()) as BiasNote[]);
   }
 
+  /** What the colours of the view mean, in the range that is set. */
+  legend(): Promise<ViewLegend> {
+    return this.call((viewer) => JSON.parse(viewer.legend()) as ViewLegend);
+  }
+
   /** Has the passes of frames from now on observed at the pixel (x, y) from the top left; undefined ends it. Rejects with `BAD_VALUE` outside. */
   inspect(pixel: [number, number] | undefined): Promise<void> {
     return this.reported(() =>
@@ -752,7 +757,7 @@ export class RestirViewer extends EventTarget {
     viewer.set_technique(id);
     settings.technique = id;
     for (const key of [...settings.values.keys()].filter((name) => !name.includes('.'))) settings.values.delete(key);
-    if (!techniqueOf(id)?.views.includes(settings.view)) settings.view = 'radiance';
+    if (!techniqueOf(id)?.views.some(({ name }) => name === settings.view)) settings.view = 'radiance';
     viewer.set_view(settings.view);
   }
 

@@ -1,15 +1,9 @@
 // Accumulation.
 // One invocation: one pixel. Reads the frame's radiance. Adds it to the sum (rgb) and count (a) of the pixel; a sample
-// that is not finite is left out and counted.
+// that is not finite is left out and counted; in the view of these, it is 1 and all others are 0.
 #include "film/film.wgsl"
 #include "lib/math.wgsl"
-
-struct Counters {
-    rays: atomic<u32>,
-    nan: atomic<u32>,
-    infinite: atomic<u32>,
-    padding: u32,
-}
+#include "film/counters.wgsl"
 
 @group(1) @binding(1) var radiance: texture_2d<f32>;
 @group(1) @binding(2) var<storage, read_write> accumulation: array<vec4f>;
@@ -20,7 +14,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= film.size) {
         return;
     }
-    let sample = textureLoad(radiance, id.xy, 0).rgb;
+    var sample = textureLoad(radiance, id.xy, 0).rgb;
+    if film.view == VIEW_NOT_FINITE {
+        sample = vec3f(select(1.0, 0.0, all(abs(sample) < vec3f(3.4e38))));
+    }
     if is_nan(sample.r) || is_nan(sample.g) || is_nan(sample.b) {
         atomicAdd(&counters.nan, 1u);
         return;

@@ -1,17 +1,15 @@
 // Debug views that every technique has.
-// One invocation: one pixel. Reads the auxiliary pictures. Writes radiance, to be shown as it is.
+// One invocation: one pixel. Reads the auxiliary pictures and what was counted for the pixel. Writes radiance: colours, or a
+// number in each channel.
 #include "scene/bindings.wgsl"
+#include "film/film.wgsl"
+#include "film/counters.wgsl"
 
-@group(1) @binding(0) var albedo_depth: texture_2d<f32>;
-@group(1) @binding(1) var normal: texture_2d<f32>;
-@group(1) @binding(2) var radiance_out: texture_storage_2d<rgba32float, write>;
-@group(1) @binding(3) var motion: texture_2d<f32>;
-
-// frame.view, as numbered in src/renderer.rs.
-const VIEW_ALBEDO = 1000u;
-const VIEW_NORMAL = 1001u;
-const VIEW_DEPTH = 1002u;
-const VIEW_MOTION = 1003u;
+@group(1) @binding(1) var albedo_depth: texture_2d<f32>;
+@group(1) @binding(2) var normal: texture_2d<f32>;
+@group(1) @binding(3) var radiance_out: texture_storage_2d<rgba32float, write>;
+@group(1) @binding(4) var motion: texture_2d<f32>;
+@group(1) @binding(5) var<storage, read_write> counters: Counters;
 
 // Pixels of motion that saturate the view.
 const MOTION_SCALE = 16.0;
@@ -25,11 +23,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let a = textureLoad(albedo_depth, pixel, 0);
     let n = textureLoad(normal, pixel, 0).xyz;
     var color = vec3f(0.0);
-    switch frame.view {
+    let counted = counters.pixel[pixel.y * frame.size.x + pixel.x];
+    switch film.view {
         case VIEW_ALBEDO: { color = a.rgb; }
         case VIEW_NORMAL: { color = select(vec3f(0.0), n * 0.5 + 0.5, dot(n, n) > 0.0); }
-        // Half of the way at one scene radius, so that near and far both show.
-        case VIEW_DEPTH: { color = vec3f(a.a / (a.a + frame.scene_radius)); }
+        case VIEW_DEPTH: { color = vec3f(a.a); }
+        case VIEW_RAYS: { color = vec3f(f32(counted.x)); }
+        case VIEW_BVH_STEPS: { color = vec3f(f32(counted.y)); }
         // Grey is at rest, red to the right, green down.
         case VIEW_MOTION: {
             color = clamp(vec3f(0.5 + textureLoad(motion, pixel, 0).xy * (0.5 / MOTION_SCALE), 0.5), vec3f(0.0), vec3f(1.0));

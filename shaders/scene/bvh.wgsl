@@ -28,6 +28,9 @@ struct Hit {
 
 // Rays traced by this invocation; passes that count add it to `counters`.
 var<private> rays_traced: u32 = 0u;
+// Nodes that these rays have visited, where pixels are counted.
+override counts_pixels: bool = false;
+var<private> nodes_visited: u32 = 0u;
 
 fn triangle_uvs(triangle: u32, uv: vec2f) -> vec4f {
     if !scene_has_textures {
@@ -167,6 +170,9 @@ fn bvh_visit(
     node: u32, origin: vec3f, inverse: vec3f, t_max: f32,
     stack: ptr<function, array<u32, BVH_STACK>>, depth: ptr<function, u32>
 ) -> u32 {
+    if counts_pixels {
+        nodes_visited += 1u;
+    }
     let grid = nodes[node].grid;
     let a = nodes[node].planes_0;
     let b = nodes[node].planes_1;

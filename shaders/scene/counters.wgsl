@@ -1,12 +1,6 @@
-// Counters that passes add to: rays are cleared every frame, what was left out when the film starts again.
+// Counters that passes add to.
 #include "scene/bvh.wgsl"
-
-struct Counters {
-    rays: atomic<u32>,
-    nan: atomic<u32>,
-    infinite: atomic<u32>,
-    padding: u32,
-}
+#include "film/counters.wgsl"
 
 @group(1) @binding(1) var<storage, read_write> counters: Counters;
 
@@ -18,5 +12,21 @@ fn flush_ray_count(local_index: u32) {
     workgroupBarrier();
     if local_index == 0u {
         atomicAdd(&counters.rays, atomicLoad(&workgroup_rays));
+    }
+}
+
+var<private> neighbors_rejected: u32 = 0u;
+
+// Notes that a neighbour was too different.
+fn count_rejected() {
+    if counts_pixels {
+        neighbors_rejected += 1u;
+    }
+}
+
+// Adds what this invocation has done to what is counted for its pixel, for views that show it.
+fn count_pixel(pixel: vec2u) {
+    if counts_pixels {
+        counters.pixel[pixel.y * frame.size.x + pixel.x] += vec4u(rays_traced, nodes_visited, neighbors_rejected, 0u);
     }
 }

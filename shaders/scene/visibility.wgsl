@@ -21,6 +21,7 @@ fn trace_pixel(pixel: vec2u) {
 fn main(@builtin(global_invocation_id) pixel: vec3u, @builtin(local_invocation_index) local_index: u32) {
     if all(pixel.xy < frame.size) {
         trace_pixel(pixel.xy);
+        count_pixel(pixel.xy);
     }
     flush_ray_count(local_index);
 }

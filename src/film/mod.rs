@@ -7,6 +7,7 @@ use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::table;
 use crate::gpu_struct;
 use crate::params::FilmParams;
+use crate::view::{COLOR_STEPS, Scale, Shown, color_map};
 use glam::UVec2;
 
 #[cfg(target_arch = "wasm32")]
@@ -23,12 +24,22 @@ pub struct FilmUniforms {
     pub automatic_exposure: u32,
     /// EV.
     pub exposure: f32,
-    /// 1: show values as they are.
-    pub raw: u32,
+    /// 0 radiance, 1 colours, 2 a number, 3 a number by magnitude ([`Scale`]).
+    pub scale: u32,
+    /// The common view that is shown.
+    pub view: u32,
+    /// The number that gets the first colour.
+    pub low: f32,
+    /// The number that gets the last colour.
+    pub high: f32,
     /// Unused.
     pub padding_0: u32,
     /// Unused.
     pub padding_1: u32,
+    /// Unused.
+    pub padding_2: u32,
+    /// Colours for numbers, sRGB from 0 to 1.
+    pub colors: [[f32; 4]; COLOR_STEPS],
 }
 }
 
@@ -43,8 +54,14 @@ pub struct Counters {
     pub infinite: u32,
     /// Unused.
     pub padding: u32,
+    /// What was counted for a pixel in the frame: rays, nodes of the BVH, neighbours that were rejected. This is the first pixel's; the
+    /// others follow it where pixels are counted.
+    pub pixel: [u32; 4],
 }
 }
+
+/// Where in [`Counters`] those of pixels begin.
+const PIXEL_COUNTS: u64 = std::mem::offset_of!(Counters, pixel) as u64;
 
 /// The film's buffers for one picture size.
 #[derive(Debug)]
@@ -97,16 +114,52 @@ impl Film {
         self.size
     }
 
-    /// Uploads how the picture is shown; `raw` shows values as they are.
-    pub fn prepare(&self, gpu: &Gpu, params: &FilmParams, raw: bool) {
+    /// Makes room to count by the pixel, or gives it back.
+    ///
+    /// # Errors
+    /// `LIMIT` where the device has none; the film stays as it was.
+    pub fn count_pixels(&mut self, gpu: &Gpu, counts: bool) -> Result<()> {
+        let pixels = if counts { u64::from(self.size.x) * u64::from(self.size.y) } else { 1 };
+        let bytes = PIXEL_COUNTS + pixels * (size_of::<Counters>() as u64 - PIXEL_COUNTS);
+        if self.counters.size() != bytes {
+            self.counters = gpu.storage("counters", bytes)?;
+        }
+        Ok(())
+    }
+
+    /// Clears what is counted by the frame; with `restart`, also what is counted since the film began.
+    pub fn clear_counters(&self, recorder: &mut Recorder<'_>, restart: bool) {
+        if restart {
+            recorder.encoder.clear_buffer(&self.counters, 0, None);
+        } else {
+            recorder.encoder.clear_buffer(&self.counters, 0, Some(std::mem::offset_of!(Counters, nan) as u64));
+            recorder.encoder.clear_buffer(&self.counters, PIXEL_COUNTS, None);
+        }
+    }
+
+    /// Uploads how the picture is shown: which view, and how its values become colours.
+    pub fn prepare(&self, gpu: &Gpu, params: &FilmParams, shown: Shown, scale: Scale) {
+        let (kind, low, high) = match scale {
+            Scale::Radiance => (0, 0.0, 1.0),
+            Scale::Colors => (1, 0.0, 1.0),
+            Scale::Number { low, high, is_logarithmic, .. } => (2 + u32::from(is_logarithmic), low, high),
+        };
         let uniforms = FilmUniforms {
             size: self.size,
             tone_map: params.tone_map,
             automatic_exposure: params.exposure_mode,
             exposure: params.exposure,
-            raw: raw.into(),
+            scale: kind,
+            view: shown.of_film(),
+            low,
+            high,
             padding_0: 0,
             padding_1: 0,
+            padding_2: 0,
+            colors: color_map(params.color_map).map(|color| {
+                let [_, r, g, b] = color.to_be_bytes().map(|byte| f32::from(byte) / 255.0);
+                [r, g, b, 1.0]
+            }),
         };
         gpu.queue.write_buffer(&self.uniforms, 0, bytemuck::bytes_of(&uniforms));
     }

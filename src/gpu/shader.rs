@@ -175,6 +175,8 @@ scene_features! {
         reuse_visibility,
         /// Whether what a reservoir holds is known to be lit where it is held.
         reservoirs_are_visible,
+        /// Rays, nodes and rejected neighbours counted by the pixel, for a view that shows them.
+        counts_pixels,
     }
 }
 

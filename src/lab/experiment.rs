@@ -3,9 +3,9 @@
 use super::settings::{self, Settings, Value, View};
 use crate::error::{Error, Result};
 use crate::output::MAX_SIDE;
-use crate::renderer::COMMON_VIEWS;
 use crate::scene::builtin;
 use crate::techniques;
+use crate::view::Shown;
 use serde::{Deserialize, Serialize};
 
 /// What is measured, of what, against what.
@@ -506,7 +506,7 @@ impl Experiment {
 }
 
 fn has_view(technique: &str, view: &str) -> bool {
-    techniques::find(technique).is_ok_and(|info| info.views.contains(&view)) || COMMON_VIEWS.contains(&view)
+    techniques::find(technique).is_ok_and(|info| Shown::find(view, info.views).is_ok())
 }
 
 /// `WIDTHxHEIGHT` of a sweep over sizes.

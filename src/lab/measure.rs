@@ -7,8 +7,9 @@ use super::results::median;
 use super::settings::{self, Settings};
 use crate::error::{Error, Result};
 use crate::output::{Image, write_atomic};
-use crate::renderer::{COMMON_VIEWS, Renderer};
+use crate::renderer::Renderer;
 use crate::scene::Camera;
+use crate::view::COMMON_VIEWS;
 use pollster::block_on;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -164,14 +165,14 @@ impl Task<'_> {
         Ok(())
     }
 
-    /// A debug view of the frame after the last one measured.
+    /// A debug view of the frame after the last one measured, as it is displayed: sRGB, 4 bytes a pixel, row-major from the top.
     ///
     /// # Errors
     /// Those of rendering; `UNKNOWN_NAME` where the technique has no such view.
-    pub fn look(&self, renderer: &mut Renderer, view: &str) -> Result<Image> {
+    pub fn look(&self, renderer: &mut Renderer, view: &str) -> Result<Vec<u8>> {
         renderer.set_view(view)?;
-        let seen = renderer.render_frame().and_then(|()| block_on(renderer.read_image()));
-        renderer.set_view(COMMON_VIEWS[0])?;
+        let seen = renderer.render_frame().and_then(|()| block_on(renderer.read_display()));
+        renderer.set_view(COMMON_VIEWS[0].name)?;
         seen
     }
 

@@ -5,7 +5,7 @@ use super::measure::{Run, Task, keep};
 use super::reference::{Reference, Subject, reference, scene_key};
 use super::results::Point;
 use super::settings::Value;
-use super::strip::{self, Exposure};
+use super::strip::{self, Exposure, Tile};
 use super::{key, report};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -186,7 +186,7 @@ impl Lab<'_> {
         let adapter = self.gpu.adapter_name();
         let exposure = Exposure::of(&stand.reference.image);
         let reference_tile = self.points_folder.join(format!("{}.png", stand.reference.key));
-        write_tile(&reference_tile, &stand.reference.image, exposure)?;
+        write_tile(&reference_tile, &strip::tile(&stand.reference.image, exposure))?;
         let reference_label =
             if site.tiles.is_empty() { "reference".to_owned() } else { format!("{scene}: reference") };
         site.tiles.push((reference_label, reference_tile));
@@ -233,8 +233,11 @@ impl Lab<'_> {
                         let (run, picture) = task.measure(renderer, &stand.reference.image)?;
                         match view {
                             _ if number > 0 => {}
-                            None => write_tile(&tile, &picture, exposure)?,
-                            Some(view) => write_tile(&tile, &task.look(renderer, view)?, Exposure::of_views())?,
+                            None => write_tile(&tile, &strip::tile(&picture, exposure))?,
+                            Some(view) => {
+                                let seen = task.look(renderer, view)?;
+                                write_tile(&tile, &strip::tile_of_display(renderer.size(), &seen))?;
+                            }
                         }
                         self.outcome.measured += 1;
                         keep(&numbers, &identity, run)?
@@ -263,7 +266,6 @@ impl Lab<'_> {
 }
 
 /// Writes the middle of a picture, for people.
-fn write_tile(path: &Path, image: &crate::output::Image, exposure: Exposure) -> Result<()> {
-    let tile = strip::tile(image, exposure);
+fn write_tile(path: &Path, tile: &Tile) -> Result<()> {
     write_png(path, tile.width, tile.height, &tile.rgba)
 }

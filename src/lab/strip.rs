@@ -3,6 +3,7 @@
 use super::metrics::{luminance, srgb_encode};
 use crate::error::{Error, Result};
 use crate::output::{Image, encode_png, write_atomic};
+use glam::UVec2;
 use std::path::{Path, PathBuf};
 
 /// Largest tile in pixels.
@@ -26,11 +27,6 @@ impl Exposure {
         let mean = reference.pixels.iter().map(|&pixel| luminance(pixel)).sum::<f64>() / count;
         Exposure(if mean > 0.0 { -(1.0 - KEY).ln() / mean } else { 1.0 })
     }
-
-    /// That for debug views, whose colours go from 0 to 1.
-    pub fn of_views() -> Self {
-        Exposure(3.0)
-    }
 }
 
 /// Pixels for people.
@@ -46,19 +42,26 @@ pub struct Tile {
 
 /// The middle of a picture.
 pub fn tile(image: &Image, Exposure(gain): Exposure) -> Tile {
-    let [width, height] = [image.width.min(TILE[0]), image.height.min(TILE[1])];
-    let [left, top] = [(image.width - width) / 2, (image.height - height) / 2];
+    let shown = |c: f32| (srgb_encode(1.0 - (-gain * f64::from(c).max(0.0)).exp()) * 255.0).round() as u8;
+    middle([image.width, image.height], |index| image.pixels[index].map(shown))
+}
+
+/// The middle of what is displayed: sRGB, 4 bytes a pixel, row-major from the top.
+pub fn tile_of_display(size: UVec2, rgba: &[u8]) -> Tile {
+    middle(size.to_array(), |index| [0, 1, 2].map(|channel| rgba[4 * index + channel]))
+}
+
+/// The middle of a picture of `size` pixels whose colours `color` knows, row-major from the top.
+fn middle(size: [u32; 2], color: impl Fn(usize) -> [u8; 3]) -> Tile {
+    let [width, height] = [size[0].min(TILE[0]), size[1].min(TILE[1])];
+    let [left, top] = [(size[0] - width) / 2, (size[1] - height) / 2];
     // Small pictures are shown with whole pixels enlarged.
     let scale = (TILE[0] / width).min(TILE[1] / height).max(1);
     let mut rgba = Vec::with_capacity((width * height * scale * scale * 4) as usize);
     for y in 0..height * scale {
         for x in 0..width * scale {
-            let pixel = image.pixels[((top + y / scale) * image.width + left + x / scale) as usize];
-            let shown = pixel.map(|c| {
-                let linear = 1.0 - (-gain * f64::from(c).max(0.0)).exp();
-                (srgb_encode(linear) * 255.0).round() as u8
-            });
-            rgba.extend([shown[0], shown[1], shown[2], 255]);
+            let [r, g, b] = color(((top + y / scale) * size[0] + left + x / scale) as usize);
+            rgba.extend([r, g, b, 255]);
         }
     }
     Tile { width: width * scale, height: height * scale, rgba }

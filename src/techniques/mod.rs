@@ -15,6 +15,7 @@ use crate::gpu::Gpu;
 use crate::gpu::recorder::Recorder;
 use crate::params::{FilmParams, ParamSpec, Params, RenderParams};
 use crate::scene::gpu_types::Layout;
+use crate::view::{COMMON_VIEWS, View};
 use glam::UVec2;
 
 /// What a technique is, for menus, the command line and the docs.
@@ -35,7 +36,7 @@ pub struct TechniqueInfo {
     /// Its parameters.
     pub params: &'static [ParamSpec],
     /// Its debug views beyond those that every technique has.
-    pub views: &'static [&'static str],
+    pub views: &'static [View],
     /// Its structs that have WGSL twins.
     pub layouts: &'static [Layout],
     /// Refuses settings, as (name, value), that contradict each other when they are set one after the other: `BAD_VALUE` naming what
@@ -67,6 +68,33 @@ impl TechniqueInfo {
             }
         })
     }
+}
+
+/// Views that several techniques have.
+pub(crate) mod views {
+    use crate::view::View;
+
+    pub const DIRECT: View = View::radiance("direct", "Light that comes straight from lights.");
+    pub const INDIRECT: View = View::radiance("indirect", "Light that has scattered more than once.");
+    pub const CONTRIBUTION_WEIGHT: View = View::magnitude(
+        "contribution weight",
+        "W of the reservoir: how much its sample counts, 1 / p(y) on the average; black where it holds none.",
+        "1 / density",
+        [1e-3, 1e3],
+    );
+    pub const TARGET_FUNCTION: View = View::magnitude(
+        "target function",
+        "p̂ of the reservoir's sample: its luminance here if nothing stands between; black where it holds none.",
+        "of luminance",
+        [1e-3, 1e3],
+    );
+    pub const CONFIDENCE_WEIGHT: View = View::number(
+        "confidence weight",
+        "c of the reservoir: for how many frames of candidates it speaks.",
+        "frames",
+        [0.0, 1.0],
+    );
+    pub const LIGHT: View = View::colors("light", "A colour for each light that is chosen; black where none is.");
 }
 
 /// A setting that makes the expected picture differ from the truth.
@@ -113,6 +141,11 @@ pub trait Technique {
         true
     }
 
+    /// The most that a view of its own that shows a number can show as it is set now, where the settings say.
+    fn highest(&self, _view: &str) -> Option<f32> {
+        None
+    }
+
     /// Makes buffers for a picture size; called before the first frame and whenever size or parameters changed.
     ///
     /// # Errors
@@ -149,14 +182,14 @@ pub fn find(id: &str) -> Result<&'static TechniqueInfo> {
     })
 }
 
-/// The registry as JSON: id, title, summary, papers, unbiased, bias, views, params.
+/// The registry as JSON: id, title, summary, papers, unbiased, bias, views (name and meaning), params.
 pub fn describe_json() -> serde_json::Value {
     ALL.iter()
         .map(|info| {
             serde_json::json!({
                 "id": info.id, "title": info.title, "summary": info.summary, "papers": info.papers,
                 "unbiased": info.unbiased, "bias": info.bias,
-                "views": crate::renderer::COMMON_VIEWS.iter().chain(info.views).collect::<Vec<_>>(),
+                "views": COMMON_VIEWS.iter().chain(info.views).map(|view| serde_json::json!({ "name": view.name, "meaning": view.meaning })).collect::<Vec<_>>(),
                 "params": info.params.iter().map(ParamSpec::describe).collect::<Vec<_>>(),
             })
         })

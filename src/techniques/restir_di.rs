@@ -1,10 +1,11 @@
 //! `restir-di`: spatiotemporal reservoir resampling of direct light, as Bitterli et al. 2020 with the switches of thesis
 //! 001, section 5.1.
 
-use super::{Bias, MAX_DEPTH, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold, candidates, reuse};
+use super::{Bias, MAX_DEPTH, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold, candidates, reuse, views};
 use crate::error::Result;
 use crate::gpu::{Gpu, recorder::Recorder, shader::table};
 use crate::params::Params;
+use crate::view::View;
 use glam::UVec2;
 
 crate::gpu_struct! {
@@ -99,7 +100,26 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
            visibility_reuse but without visibility_in_weights, where visibility differs between pixels that share samples. \
            boiling_filter above 0 darkens what is bright.",
     params: RestirDiParams::SPECS,
-    views: &["direct", "indirect", "contribution weight", "confidence weight", "light", "duplicates"],
+    views: &[
+        views::DIRECT,
+        views::INDIRECT,
+        views::CONTRIBUTION_WEIGHT,
+        views::TARGET_FUNCTION,
+        views::CONFIDENCE_WEIGHT,
+        views::LIGHT,
+        View::magnitude(
+            "duplicates",
+            "The share of pixels within 5 that hold the very same sample; black for none.",
+            "of pixels",
+            [1e-3, 1.0],
+        ),
+        View::count(
+            "rejected neighbours",
+            "Neighbours that spatial reuse has looked at and found too different.",
+            "pixels",
+            1.0,
+        ),
+    ],
     layouts: &[Reservoir::LAYOUT, RestirDiParams::LAYOUT],
     check: |_| Ok(()),
     create: |gpu| Box::new(RestirDi::new(gpu)),
@@ -217,6 +237,16 @@ impl Technique for RestirDi {
 
     fn obeys(&self, parameter: &str) -> bool {
         parameter != MAX_DEPTH || self.params.indirect == 1
+    }
+
+    fn highest(&self, view: &str) -> Option<f32> {
+        let RestirDiParams { spatial_reuse, spatial_iterations, spatial_neighbors, spatial_retries, .. } = self.params;
+        let neighbors = (spatial_reuse * spatial_iterations * spatial_neighbors) as f32;
+        match view {
+            "confidence weight" => Some((self.params.history_cap + 1.0) * (1.0 + neighbors)),
+            "rejected neighbours" => Some((neighbors * spatial_retries as f32).max(1.0)),
+            _ => None,
+        }
     }
 
     fn prepare(&mut self, gpu: &Gpu, size: UVec2) -> Result<()> {

@@ -1,9 +1,10 @@
 //! `restir-di-decoupled`: the production pipeline of Wyman and Panteleev 2021, light tiles and decoupled shading.
 
-use super::{Bias, MAX_DEPTH, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold};
+use super::{Bias, MAX_DEPTH, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold, views};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, recorder::Recorder, shader::table};
 use crate::params::Params;
+use crate::view::View;
 use glam::UVec2;
 
 crate::gpu_struct! {
@@ -121,7 +122,23 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
     bias: "Unbiased with visibility = mis or shading, while reuse_weights is balance or 1/z and checkerboard is off. The default, \
            decoupled, is too dark at the edges of shadows.",
     params: RestirDiDecoupledParams::SPECS,
-    views: &["direct", "indirect", "candidate", "temporal", "spatiotemporal", "confidence weight", "light", "subset"],
+    views: &[
+        views::DIRECT,
+        views::INDIRECT,
+        View::radiance("candidate", "The share that this frame's candidate has in direct light."),
+        View::radiance("temporal", "The share that the history has in direct light."),
+        View::radiance("spatiotemporal", "The share that the history of a pixel nearby has in direct light."),
+        views::CONFIDENCE_WEIGHT,
+        views::LIGHT,
+        View::colors("subset", "A colour for each subset of lights that a tile draws from."),
+        views::CONTRIBUTION_WEIGHT,
+        View::number(
+            "age",
+            "Frames since a ray last told whether the reservoir's sample is lit.",
+            "frames",
+            [0.0, 16.0],
+        ),
+    ],
     layouts: &[
         TileLight::LAYOUT,
         DecoupledReservoir::LAYOUT,
@@ -237,6 +254,15 @@ impl Technique for RestirDiDecoupled {
 
     fn obeys(&self, parameter: &str) -> bool {
         parameter != MAX_DEPTH || self.params.indirect == 1
+    }
+
+    fn highest(&self, view: &str) -> Option<f32> {
+        match view {
+            // Its own, and two histories.
+            "confidence weight" => Some(1.0 + 2.0 * self.params.history_cap),
+            "age" => Some((self.params.visibility_lifetime as f32).max(1.0)),
+            _ => None,
+        }
     }
 
     fn prepare(&mut self, gpu: &Gpu, size: UVec2) -> Result<()> {

@@ -1,9 +1,10 @@
 //! `restir-report`: the system of report 003, with its faults as switches beside the corrected form.
 
-use super::{Bias, MAX_DEPTH, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold};
+use super::{Bias, MAX_DEPTH, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold, views};
 use crate::error::Result;
 use crate::gpu::{Gpu, recorder::Recorder, shader::table};
 use crate::params::Params;
+use crate::view::View;
 use glam::UVec2;
 
 crate::gpu_struct! {
@@ -61,7 +62,19 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
            counts make it too bright, count weights too dark, the target that is not re-evaluated leaks light, the unguarded \
            pdf makes NaNs; missing checks are biased together with count weights.",
     params: RestirReportParams::SPECS,
-    views: &["area lights", "point lights", "indirect", "samples count", "not finite"],
+    views: &[
+        View::radiance("area lights", "Direct light by the reservoir of area lights."),
+        View::radiance("point lights", "Direct light by the reservoir of point lights."),
+        views::INDIRECT,
+        View::colors(
+            "samples count",
+            "Samples that the reservoirs count: red of area lights, green of point lights; full at twice what history may hold.",
+        ),
+        View::colors(
+            "broken weights",
+            "Weights that are no numbers: red of area lights, green of point lights; dark where all is well.",
+        ),
+    ],
     layouts: &[ReportReservoir::LAYOUT, RestirReportParams::LAYOUT],
     check: |_| Ok(()),
     create: |gpu| Box::new(RestirReport::new(gpu)),

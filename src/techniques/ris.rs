@@ -1,6 +1,6 @@
 //! `ris`: resampled importance sampling of direct light, no reuse.
 
-use super::{MAX_DEPTH, Technique, TechniqueInfo, candidates};
+use super::{MAX_DEPTH, Technique, TechniqueInfo, candidates, views};
 use crate::error::Result;
 use crate::gpu::{Gpu, recorder::Recorder, shader::table};
 use crate::params::Params;
@@ -30,7 +30,7 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
     unbiased: true,
     bias: "Unbiased for direct light; draws no indirect light.",
     params: RisParams::SPECS,
-    views: &[],
+    views: &[views::CONTRIBUTION_WEIGHT, views::TARGET_FUNCTION, views::LIGHT],
     layouts: &[RisParams::LAYOUT],
     check: |_| Ok(()),
     create: |gpu| {

@@ -141,6 +141,11 @@ impl Viewer {
         self.renderer.set_view(name).js()
     }
 
+    /// What the colours of the view mean, as JSON ([`crate::view::legend_json`]).
+    pub fn legend(&self) -> String {
+        self.renderer.legend().to_string()
+    }
+
     /// Sets the seed and starts again.
     pub fn set_seed(&mut self, seed: u32) {
         self.renderer.set_seed(seed);

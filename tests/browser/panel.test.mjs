@@ -267,21 +267,39 @@ test('links and commands say all that determines a picture', async () => {
   assert.equal(
     commandLine(state, 'car.glb', 2.25, [64, 48], 9),
     "restir render car.glb --scene-index 1 --variant 'midnight blue' --technique ris --set candidates=3 --size 64x48 --frames 9 --seed 7 " +
-      '--environment sky:elevation=6 --lights 5 --time 2.25 --animation walk --pose 0,1,2,0,0,-1,0,1,0 --accumulate no --out picture.png',
+      '--environment sky:elevation=6 --lights 5 --time 2.25 --animation walk --pose 0,1,2,0,0,-1,0,1,0 --view normal --accumulate no --out picture.png',
   );
   assert.deepEqual(readQuery('?scene-index=x&size=9000x9').warnings.length, 2);
 });
 
-test('every view but the picture says what its colours mean', () =>
-  open(small, async (page) => {
-    const silent = await page.evaluate(async () => {
-      const { describe } = await import(new URL('pkg/restir.js', location.href).href);
-      const { legendOf } = await import(new URL('views.js', location.href).href);
-      return JSON.parse(describe()).techniques.flatMap(({ views }) => views).filter((view) => view !== 'radiance' && !legendOf(view));
-    });
-    assert.deepEqual(silent, []);
+/** The colour of a pixel of a canvas-sized picture of RGBA bytes, as #rrggbb. */
+const hex = (bytes, at) => `#${[0, 1, 2].map((channel) => bytes[4 * at + channel].toString(16).padStart(2, '0')).join('')}`;
+
+test('a view of a number has a legend with its colours and ends, which can be fitted to the picture', () =>
+  open(`${small}&technique=restir-di`, async (page) => {
+    const words = () => page.$eval('#legend', (element) => element.innerText);
+    assert.equal(await page.$eval('#legend', (element) => element.hidden), true, 'the picture has none');
     await page.select('#view', 'motion');
-    await page.waitForFunction(() => /grey at rest/.test(document.getElementById('legend').textContent), { polling: 50 });
+    await page.waitForFunction(() => /grey at rest/.test(document.getElementById('legend').innerText), { polling: 50 });
+    assert.equal(await page.$eval('#legend-scale', (element) => element.hidden), true, 'colours that mean something have no ends');
+    await page.select('#view', 'BVH steps');
+    await page.waitForFunction(() => document.getElementById('legend-high').textContent === '1024', { polling: 50 });
+    assert.match(await words(), /nodes/);
+    // The fit: the ends become those of the picture, are in the panel and the address, and colours reach from the first to the last.
+    await page.click('#legend-fit');
+    await page.waitForFunction(() => document.getElementById('legend-high').textContent !== '1024', { polling: 50 });
+    const [low, high] = await page.$$eval('#legend-low, #legend-high', (ends) => ends.map(({ textContent }) => Number(textContent)));
+    assert.ok(low > 0 && low < high && high < 1024, `${low} to ${high}`);
+    assert.equal(await page.$eval('[id="parameter-film.range_high"]', (input) => Number(input.value)), high);
+    await page.waitForFunction((end) => new URLSearchParams(location.search).get('film.range_high') === String(end), { polling: 50 }, high);
+    const shown = await readDisplay(page);
+    const colors = new Set(Array.from({ length: shown.length / 4 }, (_, at) => hex(shown, at)));
+    assert.ok(colors.has('#440154') && colors.has('#fde725'), 'both ends of viridis are in the picture');
+    await page.select('[id="parameter-film.color_map"]', 'magma');
+    await page.waitForFunction(() => document.getElementById('legend-bar').style.background.includes('rgb(252, 253, 191)'), { polling: 50 });
+    await page.click('#legend-own');
+    await page.waitForFunction(() => document.getElementById('legend-high').textContent === '1024', { polling: 50 });
+    assert.equal(await page.$eval('#legend-own', (button) => button.disabled), true);
     await page.select('#view', 'radiance');
     await page.waitForFunction(() => document.getElementById('legend').hidden, { polling: 50 });
   }));

@@ -17,6 +17,7 @@ fn main(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
             radiance = scattered_radiance(load_pixel(pixel), false, &rng);
         }
         textureStore(indirect_out, pixel, vec4f(radiance, 1.0));
+        count_pixel(pixel);
     }
     flush_ray_count(local_index);
 }

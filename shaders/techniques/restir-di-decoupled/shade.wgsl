@@ -29,6 +29,8 @@ const VIEW_SPATIOTEMPORAL = 5u;
 const VIEW_CONFIDENCE_WEIGHT = 6u;
 const VIEW_LIGHT = 7u;
 const VIEW_SUBSET = 8u;
+const VIEW_CONTRIBUTION_WEIGHT = 9u;
+const VIEW_AGE = 10u;
 
 // What a pixel shows of direct light, and hands on.
 struct Shaded {
@@ -261,13 +263,10 @@ fn shade_pixel(pixel: vec2u) -> vec3f {
         case VIEW_DIRECT: { return shaded.direct; }
         case VIEW_INDIRECT: { return indirect_light(pixel, params.indirect); }
         case VIEW_CANDIDATE, VIEW_TEMPORAL, VIEW_SPATIOTEMPORAL: { return shaded.viewed; }
-        // White at the most that a pixel can have: its own, and two histories.
-        case VIEW_CONFIDENCE_WEIGHT: {
-            return vec3f(unpack_state(shaded.reservoir.state).confidence_weight / (1.0 + 2.0 * params.history_cap));
-        }
-        case VIEW_LIGHT: {
-            return number_color(shaded.reservoir.light);
-        }
+        case VIEW_CONFIDENCE_WEIGHT: { return vec3f(unpack_state(shaded.reservoir.state).confidence_weight); }
+        case VIEW_CONTRIBUTION_WEIGHT: { return vec3f(shaded.reservoir.unbiased_contribution_weight); }
+        case VIEW_AGE: { return vec3f(f32(unpack_state(shaded.reservoir.state).age)); }
+        case VIEW_LIGHT: { return number_color(shaded.reservoir.light); }
         case VIEW_SUBSET: { return number_color(tile_subset(pixel)); }
         default: { return surface.emission + shaded.direct + indirect_light(pixel, params.indirect); }
     }

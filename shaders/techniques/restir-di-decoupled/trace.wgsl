@@ -124,6 +124,7 @@ fn main(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_inde
     let pixel = invocation_pixel(id.xy);
     if all(pixel < frame.size) && pixel_has_surface(pixel) {
         trace_pixel(pixel);
+        count_pixel(pixel);
     }
     flush_ray_count(local_index);
 }

@@ -14,15 +14,17 @@
 const VIEW_DIRECT = 1u;
 const VIEW_INDIRECT = 2u;
 const VIEW_CONTRIBUTION_WEIGHT = 3u;
-const VIEW_CONFIDENCE_WEIGHT = 4u;
-const VIEW_LIGHT = 5u;
-const VIEW_DUPLICATES = 6u;
+const VIEW_TARGET_FUNCTION = 4u;
+const VIEW_CONFIDENCE_WEIGHT = 5u;
+const VIEW_LIGHT = 6u;
+const VIEW_DUPLICATES = 7u;
+const VIEW_REJECTED_NEIGHBOURS = 8u;
 
-// How many of the pixels within `DUPLICATES_RADIUS` hold the very sample that this one holds, as a share of them: black where
-// none does, over red and yellow to white where all do (Wyman and Panteleev 2021, Figure 9).
+// How many of the pixels within `DUPLICATES_RADIUS` hold the very sample that this one holds, as a share of them (Wyman and
+// Panteleev 2021, Figure 9).
 const DUPLICATES_RADIUS = 5;
 
-fn duplicates_color(pixel: vec2u, own: Reservoir) -> vec3f {
+fn duplicates(pixel: vec2u, own: Reservoir) -> f32 {
     var count = 0u;
     var pixels = 0u;
     for (var y = -DUPLICATES_RADIUS; y <= DUPLICATES_RADIUS; y += 1) {
@@ -37,8 +39,7 @@ fn duplicates_color(pixel: vec2u, own: Reservoir) -> vec3f {
                 && reservoir.unbiased_contribution_weight > 0.0);
         }
     }
-    let heat = 3.0 * sqrt(f32(count) / f32(max(pixels, 1u)));
-    return clamp(vec3f(heat, heat - 1.0, heat - 2.0), vec3f(0.0), vec3f(1.0));
+    return f32(count) / f32(max(pixels, 1u));
 }
 
 fn pixel_radiance(pixel: vec2u) -> vec3f {
@@ -50,17 +51,12 @@ fn pixel_radiance(pixel: vec2u) -> vec3f {
     let first = load_reservoir(pixel, 0u);
     switch frame.view {
         case VIEW_INDIRECT: { return indirect_light(pixel, params.indirect); }
-        // W times p-hat is the estimate itself up to visibility, hence dimensionless enough to look at.
-        case VIEW_CONTRIBUTION_WEIGHT: {
-            return vec3f(first.unbiased_contribution_weight * target_function(surface, reservoir_sample(first), false));
-        }
-        // White at what one pixel's history can hold; neighbours add theirs, so the scale is that of the pass before them.
-        case VIEW_CONFIDENCE_WEIGHT: {
-            let neighbors = f32(params.spatial_reuse * params.spatial_iterations * params.spatial_neighbors);
-            return vec3f(first.confidence_weight / ((params.history_cap + 1.0) * (1.0 + neighbors)));
-        }
+        case VIEW_CONTRIBUTION_WEIGHT: { return vec3f(first.unbiased_contribution_weight); }
+        case VIEW_TARGET_FUNCTION: { return vec3f(target_function(surface, reservoir_sample(first), false)); }
+        case VIEW_CONFIDENCE_WEIGHT: { return vec3f(first.confidence_weight); }
         case VIEW_LIGHT: { return number_color(first.light); }
-        case VIEW_DUPLICATES: { return duplicates_color(pixel, first); }
+        case VIEW_DUPLICATES: { return vec3f(duplicates(pixel, first)); }
+        case VIEW_REJECTED_NEIGHBOURS: { return vec3f(f32(counters.pixel[pixel.y * frame.size.x + pixel.x].z)); }
         default: {}
     }
     var direct = vec3f(0.0);
@@ -78,6 +74,7 @@ fn pixel_radiance(pixel: vec2u) -> vec3f {
 fn main(@builtin(global_invocation_id) pixel: vec3u, @builtin(local_invocation_index) local_index: u32) {
     if all(pixel.xy < frame.size) {
         textureStore(radiance_out, pixel.xy, vec4f(pixel_radiance(pixel.xy), 1.0));
+        count_pixel(pixel.xy);
     }
     flush_ray_count(local_index);
 }

@@ -11,11 +11,11 @@
 @group(1) @binding(2) var radiance_out: texture_storage_2d<rgba32float, write>;
 @group(1) @binding(4) var<storage, read> reservoirs: array<ReportReservoir>;
 
-const VIEW_AREA = 1u;
-const VIEW_POINT = 2u;
+const VIEW_AREA_LIGHTS = 1u;
+const VIEW_POINT_LIGHTS = 2u;
 const VIEW_INDIRECT = 3u;
 const VIEW_SAMPLES_COUNT = 4u;
-const VIEW_NOT_FINITE = 5u;
+const VIEW_BROKEN_WEIGHTS = 5u;
 
 fn is_finite(value: f32) -> bool {
     return !is_nan(value) && !is_infinite(value);
@@ -46,7 +46,7 @@ fn pixel_radiance(pixel: vec2u) -> vec3f {
             / (2.0 * (params.history_cap + 1.0) * f32(proposal_count()));
     }
     // Red and green as well: whose weight is NaN or infinite; dark where all is well.
-    if frame.view == VIEW_NOT_FINITE {
+    if frame.view == VIEW_BROKEN_WEIGHTS {
         let bad = vec3<bool>(!is_finite(area.unbiased_contribution_weight), !is_finite(point.unbiased_contribution_weight),
             false);
         return select(vec3f(0.02), vec3f(1.0), bad);
@@ -54,7 +54,7 @@ fn pixel_radiance(pixel: vec2u) -> vec3f {
     let surface = load_pixel(pixel);
     var radiance = vec3f(0.0);
     for (var strategy = 0u; strategy < STRATEGY_COUNT; strategy += 1u) {
-        if frame.view == 0u || frame.view == strategy + VIEW_AREA {
+        if frame.view == 0u || frame.view == strategy + VIEW_AREA_LIGHTS {
             radiance += shade_strategy(surface, pixel, strategy);
         }
     }
@@ -68,6 +68,7 @@ fn pixel_radiance(pixel: vec2u) -> vec3f {
 fn main(@builtin(global_invocation_id) pixel: vec3u, @builtin(local_invocation_index) local_index: u32) {
     if all(pixel.xy < frame.size) {
         textureStore(radiance_out, pixel.xy, vec4f(pixel_radiance(pixel.xy), 1.0));
+        count_pixel(pixel.xy);
     }
     flush_ray_count(local_index);
 }

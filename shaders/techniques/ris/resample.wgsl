@@ -1,6 +1,7 @@
 // What a pixel shows by resampled importance sampling: the code of ris/ris and of its inspection.
 #include "scene/visibility_buffer.wgsl"
 #include "techniques/common/candidates.wgsl"
+#include "techniques/common/number_color.wgsl"
 
 struct RisParams {
     candidates: u32, // M
@@ -12,9 +13,13 @@ struct RisParams {
 
 @group(1) @binding(3) var<uniform> params: RisParams;
 
+const VIEW_CONTRIBUTION_WEIGHT = 1u;
+const VIEW_TARGET_FUNCTION = 2u;
+const VIEW_LIGHT = 3u;
+
 fn pixel_radiance(pixel: vec2u) -> vec3f {
     if !pixel_has_surface(pixel) {
-        return environment_evaluate(primary_ray(pixel).direction);
+        return select(vec3f(0.0), environment_evaluate(primary_ray(pixel).direction), frame.view == 0u);
     }
     let surface = load_pixel(pixel);
     if frame.light_count == 0u {
@@ -26,8 +31,16 @@ fn pixel_radiance(pixel: vec2u) -> vec3f {
     var direct = vec3f(0.0);
     for (var i = 0u; i < params.samples; i += 1u) {
         let selected = streams[i].selected;
-        let weight = stream_contribution_weight(streams[i], target_function(surface, selected, false));
+        let target_value = target_function(surface, selected, false);
+        let weight = stream_contribution_weight(streams[i], target_value);
         let reservoir = Reservoir(selected.light, selected.point, weight, 1.0);
+        // Views show the first of N.
+        switch frame.view {
+            case VIEW_CONTRIBUTION_WEIGHT: { return vec3f(weight); }
+            case VIEW_TARGET_FUNCTION: { return vec3f(target_value); }
+            case VIEW_LIGHT: { return number_color(selected.light); }
+            default: {}
+        }
         direct += shade_reservoir(surface, reservoir);
         observe_result(i, reservoir, REASON_NONE);
     }

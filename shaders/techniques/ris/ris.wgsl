@@ -11,6 +11,7 @@
 fn main(@builtin(global_invocation_id) pixel: vec3u, @builtin(local_invocation_index) local_index: u32) {
     if all(pixel.xy < frame.size) {
         textureStore(radiance_out, pixel.xy, vec4f(pixel_radiance(pixel.xy), 1.0));
+        count_pixel(pixel.xy);
     }
     flush_ray_count(local_index);
 }

@@ -7,6 +7,7 @@ use pollster::block_on;
 use restir::scene::Camera;
 use restir::scene::flat::SceneStats;
 use restir::techniques::{self, TechniqueInfo, presets};
+use restir::view::Shown;
 use restir::{Gpu, GpuOptions, Renderer, lab};
 use std::time::Instant;
 
@@ -46,6 +47,9 @@ pub struct Options {
     /// Longest path in scattering events: 1 is direct light only. Lights seen directly are always drawn.
     #[arg(long, value_name = "N", value_parser = options::max_depth)]
     pub max_depth: Option<u32>,
+    /// What to show: a view that every technique has, or one of its own (see `restir techniques`).
+    #[arg(long, value_name = "NAME", default_value = "radiance")]
+    pub view: String,
     #[command(flatten)]
     pub choice: scene::Choice,
     #[command(flatten)]
@@ -102,6 +106,7 @@ impl Session {
         for (key, value) in &settings {
             technique.spec(key).map_or(Ok(0), |spec| spec.parse(value)).map_err(Failure::from_option)?;
         }
+        Shown::find(&options.view, technique.views).map_err(Failure::from_option)?;
         (technique.check)(&settings).map_err(Failure::from_option)?;
         let flat = scene::open(name, &options.choice, Some((&options.lighting, options.seed)))?;
         report::warnings(&flat.warnings);
@@ -125,6 +130,7 @@ impl Session {
         if let Some(animation) = &options.animation {
             renderer.set_animation(animation).map_err(Failure::from_option)?;
         }
+        renderer.set_view(&options.view).map_err(Failure::from_option)?;
         renderer.set_time(options.time);
         renderer.set_seed(options.seed);
         renderer.follow_camera(camera)?;

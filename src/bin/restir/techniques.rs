@@ -5,6 +5,7 @@ use crate::report;
 use restir::params::{FilmParams, ParamKind, ParamSpec, Params, RenderParams};
 use restir::techniques::presets::{self, Preset};
 use restir::techniques::{self, TechniqueInfo};
+use restir::view::{COMMON_VIEWS, View};
 
 /// List the techniques with their papers, bias, parameters and views.
 #[derive(clap::Args)]
@@ -24,6 +25,8 @@ pub fn run(args: &Args) -> Result<()> {
         let title = std::iter::once(format!("{group}: parameters of every technique"));
         sections.push(title.chain(parameters).collect::<Vec<_>>().join("\n"));
     }
+    let views = COMMON_VIEWS.iter().map(view);
+    sections.push(std::iter::once("views of every technique".to_owned()).chain(views).collect::<Vec<_>>().join("\n"));
     let presets = presets::ALL.iter().map(preset);
     sections.push(std::iter::once("presets: --preset ID".to_owned()).chain(presets).collect::<Vec<_>>().join("\n"));
     report::text(&sections.join("\n\n"))
@@ -34,7 +37,12 @@ fn describe(info: &TechniqueInfo) -> String {
     lines.extend(info.papers.iter().map(|paper| format!("  paper: {paper}")));
     lines.push(format!("  bias: {}", info.bias));
     lines.extend(info.params.iter().map(|spec| parameter("", spec)));
+    lines.extend(info.views.iter().map(view));
     lines.join("\n")
+}
+
+fn view(View { name, meaning, .. }: &View) -> String {
+    format!("  --view '{name}'\n      {meaning}")
 }
 
 fn preset(Preset { id, title, doc, technique, settings }: &Preset) -> String {
