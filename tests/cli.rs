@@ -169,6 +169,17 @@ fn a_full_stderr_changes_no_exit_code() {
 }
 
 #[test]
+fn a_view_of_a_number_is_written_as_that_number() {
+    let folder = Folder::new("view");
+    let out = folder.path("rays.exr");
+    let frame = ["--size", "16x12", "--frames", "1", "--out", &out, "--json"];
+    let report = succeed_json(&[&["render", "builtin:cornell", "--view", "rays"][..], &frame].concat());
+    let image = read_exr(Path::new(&out)).unwrap();
+    let rays: f64 = image.pixels.iter().map(|pixel| f64::from(pixel[0])).sum();
+    assert_eq!(Some(rays), report["counters"]["rays"].as_f64());
+}
+
+#[test]
 fn wrong_names_and_values_are_exit_code_2_and_say_what_is_right() {
     let folder = Folder::new("names");
     let out = folder.path("a.png");
@@ -186,6 +197,7 @@ fn wrong_names_and_values_are_exit_code_2_and_say_what_is_right() {
     render("missing.glb", &["--preset", "lanz-2025", "--technique", "ris"], "USAGE", "--technique");
     render("missing.glb", &["--pose", "0,0,0,0,0,1,0,1"], "USAGE", "nine numbers");
     render("missing.glb", &["--pose", "0,0,0,0,0,1,0,0,1"], "USAGE", "nine numbers");
+    render("missing.glb", &["--view", "beauty"], "UNKNOWN_NAME", "BVH steps");
     render("builtin:cornell", &["--set", "colour=1"], "UNKNOWN_NAME", "colour");
     render("builtin:cornell", &["--set", "film.exposure=bright"], "BAD_VALUE", "exposure");
     render("builtin:many", &[], "UNKNOWN_NAME", "many-lights:N");
