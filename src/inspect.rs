@@ -114,13 +114,15 @@ pub struct Trace {
 const KINDS: [&str; 4] = ["candidate", "domain", "rejected", "result"];
 
 /// By `Observation::reason`, `REASON_*` of `shaders/techniques/common/observations.wgsl`.
-const REASONS: [&str; 6] = [
+const REASONS: [&str; 8] = [
     "",
     "there is no previous frame to reuse",
     "what the pixel shows was outside the previous picture",
     "there was no surface in the previous frame, or there is none now",
     "the previous frame showed another surface there",
     "its own confidence weight is at least spatial_confidence_limit",
+    "the place that was drawn is the pixel itself, or outside the picture",
+    "the neighbour that was drawn is too different",
 ];
 
 /// One pixel of the last frame.

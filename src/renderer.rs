@@ -559,7 +559,7 @@ impl Renderer {
         self.advance_time();
         self.prepare_environment();
         self.gpu.queue.write_buffer(&self.frame_uniform, 0, bytemuck::bytes_of(&self.frame()));
-        self.film.prepare(&self.gpu, &self.film_params, self.shown, self.scale());
+        self.film.prepare(&self.gpu, &self.film_params, self.shown.of_film(self.technique.info().views), self.scale());
 
         let restart = self.restart_film || !self.accumulate;
         let counts = self.view().counts;
@@ -594,7 +594,7 @@ impl Renderer {
         } else {
             record_auxiliary(&mut recorder, [&self.albedo_depth, &self.normal, &self.motion], size)?;
         }
-        if self.shown.is_drawn_by_film() {
+        if self.shown.is_drawn_by_film(self.technique.info().views) {
             recorder
                 .pass(&table::FILM_VIEW)
                 .bind("albedo_depth", &self.albedo_depth)
@@ -643,7 +643,7 @@ impl Renderer {
     /// # Errors
     /// `DEVICE` for an error the device has reported.
     pub fn render_display(&mut self) -> Result<()> {
-        self.film.prepare(&self.gpu, &self.film_params, self.shown, self.scale());
+        self.film.prepare(&self.gpu, &self.film_params, self.shown.of_film(self.technique.info().views), self.scale());
         let mut recorder = Recorder::new(&self.gpu, self.display_timer.as_mut());
         recorder.share("film", self.film.uniforms());
         self.film.record_display(&mut recorder, &self.film_params)?;

@@ -93,10 +93,13 @@ pub const COMMON_VIEWS: &[View] = &[
     ),
 ];
 
-/// The common views that `film/view` draws. (The film itself keeps an eye on what is not finite.)
-const DRAWN: std::ops::RangeInclusive<usize> = 1..=6;
+/// The common view that `film/accumulate` makes, for it finds what is not finite.
+const NOT_FINITE: u32 = 7;
 
-/// Those of them that show the first surface, for which no technique has to run.
+/// The view of rejected neighbours, in the film's numbers: a technique that has any lists it, but it is counted as rays are.
+const REJECTED_NEIGHBORS: u32 = COMMON_VIEWS.len() as u32;
+
+/// The common views that show the first surface, for which no technique has to run.
 const OF_SURFACE: std::ops::RangeInclusive<usize> = 1..=4;
 
 /// The one of them whose range is the scene's.
@@ -141,11 +144,6 @@ impl Shown {
         !matches!(self, Shown::Common(index) if OF_SURFACE.contains(&index))
     }
 
-    /// Whether `film/view` draws it.
-    pub fn is_drawn_by_film(self) -> bool {
-        matches!(self, Shown::Common(index) if DRAWN.contains(&index))
-    }
-
     /// Whether its range is how far the scene goes.
     pub fn is_depth(self) -> bool {
         self == Shown::Common(DEPTH)
@@ -159,12 +157,18 @@ impl Shown {
         }
     }
 
-    /// `FilmUniforms::view`: 0, or the common view.
-    pub fn of_film(self) -> u32 {
+    /// `FilmUniforms::view`: 0, or what the film draws, of a technique's `own` views what is counted.
+    pub fn of_film(self, own: &'static [View]) -> u32 {
         match self {
             Shown::Common(index) => index as u32,
+            Shown::Own(_) if self.view(own).counts => REJECTED_NEIGHBORS,
             Shown::Own(_) => 0,
         }
+    }
+
+    /// Whether `film/view` draws it.
+    pub fn is_drawn_by_film(self, own: &'static [View]) -> bool {
+        ![0, NOT_FINITE].contains(&self.of_film(own))
     }
 }
 

@@ -30,11 +30,12 @@ fn close(a: f32, b: f32, what: &str) {
 }
 
 /// W = sum w / p-hat(y) (dissertation 004, Eq. 6.22): of candidates, and of every combination of domains.
-fn assert_weights_are_those_of_resampling(inspection: &Inspection, stage: &str) {
-    let result = of(inspection, "result", stage).next().unwrap_or_else(|| panic!("no {stage}: {inspection:#?}"));
+fn assert_weights_are_those_of_resampling(inspection: &Inspection, stage: &str, slot: u32) {
+    let of = |kind, stage| of(inspection, kind, stage).filter(move |note| note.slot == slot);
+    let result = of("result", stage).next().unwrap_or_else(|| panic!("no {stage}: {inspection:#?}"));
     let offers: Vec<&Note> = match stage {
-        "initial" => of(inspection, "candidate", stage).collect(),
-        _ => of(inspection, "domain", stage).collect(),
+        "initial" => of("candidate", stage).collect(),
+        _ => of("domain", stage).collect(),
     };
     assert!(!offers.is_empty() || !result.reason.is_empty(), "{stage}: nothing was offered, and no word why");
     let Some(sample) = result.sample.as_ref().filter(|_| result.unbiased_contribution_weight > 0.0) else { return };
@@ -63,11 +64,42 @@ fn notes_add_up_to_the_reservoirs() {
             assert_eq!(seen.dropped, 0);
             assert_eq!(of(&seen, "candidate", "initial").count(), 32, "M of them");
             for stage in ["initial", "temporal", "spatial 1", "spatial 2"] {
-                assert_weights_are_those_of_resampling(&seen, stage);
+                assert_weights_are_those_of_resampling(&seen, stage, 0);
             }
             let own = of(&seen, "domain", "spatial 1").next().and_then(|note| note.pixel);
             assert!(own.is_none_or(|own| own == pixel.to_array()), "the first domain is the pixel itself");
         }
+    }
+}
+
+/// Techniques whose reservoirs are not those of restir-di: one a strategy, or three samples met at once.
+#[test]
+fn notes_of_other_reservoirs_add_up() {
+    for (technique, stages, slots) in [
+        ("restir-report", &["initial", "temporal", "spatial 1"][..], 2),
+        ("restir-di-decoupled", &["initial", "temporal"][..], 1),
+    ] {
+        let mut renderer = renderer("cornell-64", technique, &[]);
+        let mut chosen = 0;
+        for pixel in [UVec2::new(16, 20), UVec2::new(5, 12), UVec2::new(16, 5), UVec2::new(24, 22)] {
+            let seen = inspect(&mut renderer, pixel, 4);
+            assert_eq!(seen.dropped, 0);
+            for stage in stages {
+                for slot in 0..slots {
+                    assert_weights_are_those_of_resampling(&seen, stage, slot);
+                }
+                let results = of(&seen, "result", stage);
+                chosen += results.filter(|note| note.unbiased_contribution_weight > 0.0).count();
+            }
+            let (first, second) = {
+                let mut domains = of(&seen, "domain", "temporal").map(|note| note.pixel);
+                (domains.next().flatten(), domains.next())
+            };
+            assert_eq!(first, Some(pixel.to_array()), "the first domain is the pixel itself");
+            assert!(second.is_some(), "{technique}: history joins");
+        }
+        println!("{technique}: {chosen} reservoirs hold a sample");
+        assert!(chosen >= 6);
     }
 }
 

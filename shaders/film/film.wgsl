@@ -31,5 +31,6 @@ const VIEW_MOTION = 4u;
 const VIEW_RAYS = 5u;
 const VIEW_BVH_STEPS = 6u;
 const VIEW_NOT_FINITE = 7u;
+const VIEW_REJECTED_NEIGHBOURS = 8u; // of techniques that have any
 
 @group(1) @binding(0) var<uniform> film: FilmUniforms;

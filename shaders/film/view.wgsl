@@ -34,6 +34,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         case VIEW_MOTION: {
             color = clamp(vec3f(0.5 + textureLoad(motion, pixel, 0).xy * (0.5 / MOTION_SCALE), 0.5), vec3f(0.0), vec3f(1.0));
         }
+        case VIEW_REJECTED_NEIGHBOURS: { color = vec3f(f32(counted.z)); }
         default: {}
     }
     textureStore(radiance_out, pixel, vec4f(color, 1.0));

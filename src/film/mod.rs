@@ -7,7 +7,7 @@ use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::table;
 use crate::gpu_struct;
 use crate::params::FilmParams;
-use crate::view::{COLOR_STEPS, Scale, Shown, color_map};
+use crate::view::{COLOR_STEPS, Scale, color_map};
 use glam::UVec2;
 
 #[cfg(target_arch = "wasm32")]
@@ -137,8 +137,8 @@ impl Film {
         }
     }
 
-    /// Uploads how the picture is shown: which view, and how its values become colours.
-    pub fn prepare(&self, gpu: &Gpu, params: &FilmParams, shown: Shown, scale: Scale) {
+    /// Uploads how the picture is shown: which view ([`Shown::of_film`](crate::view::Shown::of_film)), and how its values become colours.
+    pub fn prepare(&self, gpu: &Gpu, params: &FilmParams, view: u32, scale: Scale) {
         let (kind, low, high) = match scale {
             Scale::Radiance => (0, 0.0, 1.0),
             Scale::Colors => (1, 0.0, 1.0),
@@ -150,7 +150,7 @@ impl Film {
             automatic_exposure: params.exposure_mode,
             exposure: params.exposure,
             scale: kind,
-            view: shown.of_film(),
+            view,
             low,
             high,
             padding_0: 0,

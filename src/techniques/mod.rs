@@ -94,6 +94,12 @@ pub(crate) mod views {
         "frames",
         [0.0, 1.0],
     );
+    pub const REJECTED_NEIGHBORS: View = View::count(
+        "rejected neighbours",
+        "Neighbours that spatial reuse has looked at and found too different.",
+        "pixels",
+        1.0,
+    );
     pub const LIGHT: View = View::colors("light", "A colour for each light that is chosen; black where none is.");
 }
 

@@ -113,12 +113,7 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
             "of pixels",
             [1e-3, 1.0],
         ),
-        View::count(
-            "rejected neighbours",
-            "Neighbours that spatial reuse has looked at and found too different.",
-            "pixels",
-            1.0,
-        ),
+        views::REJECTED_NEIGHBORS,
     ],
     layouts: &[Reservoir::LAYOUT, RestirDiParams::LAYOUT],
     check: |_| Ok(()),

@@ -138,6 +138,7 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
             "frames",
             [0.0, 16.0],
         ),
+        views::REJECTED_NEIGHBORS,
     ],
     layouts: &[
         TileLight::LAYOUT,
@@ -260,6 +261,7 @@ impl Technique for RestirDiDecoupled {
         match view {
             // Its own, and two histories.
             "confidence weight" => Some(1.0 + 2.0 * self.params.history_cap),
+            "rejected neighbours" => Some((1 + 2 * self.params.spatiotemporal_tries) as f32),
             "age" => Some((self.params.visibility_lifetime as f32).max(1.0)),
             _ => None,
         }
@@ -316,6 +318,7 @@ impl Technique for RestirDiDecoupled {
             .dispatch([self.params.tile_lights.div_ceil(presample.workgroup_size[0]), self.params.tile_subsets, 1])?;
         recorder
             .pass(&table::RESTIR_DI_DECOUPLED_SELECT)
+            .inspected_by(&table::RESTIR_DI_DECOUPLED_INSPECT_SELECT)
             .bind("params", &self.uniform)
             .bind("tile_lights", &buffers.tile_lights)
             .bind("tile_inverse_pdfs", &buffers.tile_inverse_pdfs)
@@ -335,6 +338,7 @@ impl Technique for RestirDiDecoupled {
         }
         recorder
             .pass(&table::RESTIR_DI_DECOUPLED_SHADE)
+            .inspected_by(&table::RESTIR_DI_DECOUPLED_INSPECT_SHADE)
             .bind("params", &self.uniform)
             .bind("selections", &buffers.selections)
             .bind("reservoirs_previous", &buffers.reservoirs[previous])

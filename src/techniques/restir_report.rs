@@ -74,6 +74,7 @@ pub(super) static INFO: TechniqueInfo = TechniqueInfo {
             "broken weights",
             "Weights that are no numbers: red of area lights, green of point lights; dark where all is well.",
         ),
+        views::REJECTED_NEIGHBORS,
     ],
     layouts: &[ReportReservoir::LAYOUT, RestirReportParams::LAYOUT],
     check: |_| Ok(()),
@@ -213,6 +214,7 @@ impl Technique for RestirReport {
 
         recorder
             .pass(&table::RESTIR_REPORT_INITIAL)
+            .inspected_by(&table::RESTIR_REPORT_INSPECT_INITIAL)
             .bind("params", &self.uniform)
             .bind("reservoirs_out", &reservoirs[current])
             .dispatch_over(size)?;
@@ -220,6 +222,7 @@ impl Technique for RestirReport {
         if temporal_reuse && buffers.has_history {
             recorder
                 .pass(&table::RESTIR_REPORT_TEMPORAL)
+                .inspected_by(&table::RESTIR_REPORT_INSPECT_TEMPORAL)
                 .bind("params", &self.uniform)
                 .bind("reservoirs", &reservoirs[current])
                 .bind("reservoirs_previous", &reservoirs[history])
@@ -231,6 +234,7 @@ impl Technique for RestirReport {
         if spatial_reuse {
             recorder
                 .pass(&table::RESTIR_REPORT_SPATIAL)
+                .inspected_by(&table::RESTIR_REPORT_INSPECT_SPATIAL)
                 .bind("params", &self.uniform)
                 .bind("reservoirs", &reservoirs[current])
                 .bind("reservoirs_out", &reservoirs[spare])

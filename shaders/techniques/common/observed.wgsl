@@ -1,7 +1,8 @@
 // The pixel inspector's notes. A pass of it is one invocation that runs the code of another pass once more for one pixel, with
 // the same random numbers, and writes down what it sees there: candidates, domains that are joined, the reservoir that comes out.
 // That code calls `observe_...` where there is something to see; in the pass itself these do nothing (unobserved.wgsl). The
-// including pass begins with `observe_begin`, and says by `observe_result` what it notes of a reservoir that is done.
+// including pass begins with `observe_begin`, and says by `observe_result` what it notes of a reservoir that is done, and by
+// `observed_value` how the technique values a sample.
 #include "scene/trace.wgsl"
 #include "scene/visibility_buffer.wgsl"
 #include "techniques/common/resampling.wgsl"
@@ -36,7 +37,7 @@ fn observe(given: Observation) {
     var note = given;
     note.stage = observed_stage;
     if note.light != NONE {
-        let valued = value_sample(observed_surface, LightSample(note.light, note.point), false);
+        let valued = observed_value(LightSample(note.light, note.point));
         note.direction = valued.direction;
         note.distance = valued.distance;
         note.target_value = valued.target_value;
@@ -64,6 +65,17 @@ fn observe_domain(domain: u32, pixel: vec2u) {
     observed_pixels[domain] = pixel;
 }
 
+// A reservoir that joins with the MIS weight m and the resampling weight w.
+fn observe_joined(slot: u32, pixel: vec2u, reservoir: Reservoir, mis_weight: f32, resampling_weight: f32) {
+    var note = observation(OBSERVATION_DOMAIN, slot, reservoir_sample(reservoir));
+    note.pixel = pixel;
+    note.unbiased_contribution_weight = reservoir.unbiased_contribution_weight;
+    note.confidence_weight = reservoir.confidence_weight;
+    note.mis_weight = mis_weight;
+    note.resampling_weight = resampling_weight;
+    observe(note);
+}
+
 fn observe_rejected(pixel: vec2u) {
     var note = observation(OBSERVATION_REJECTED, 0u, LightSample(NONE, 0u));
     note.pixel = pixel;
@@ -75,7 +87,7 @@ fn observe_reservoir(slot: u32, reservoir: Reservoir, reason: u32) {
     note.unbiased_contribution_weight = reservoir.unbiased_contribution_weight;
     note.confidence_weight = reservoir.confidence_weight;
     note.reason = reason;
-    let valued = value_sample(observed_surface, reservoir_sample(reservoir), false);
+    let valued = observed_value(reservoir_sample(reservoir));
     note.is_visible = u32(valued.target_value > 0.0 && sample_is_visible(observed_surface, valued, false));
     observe(note);
 }

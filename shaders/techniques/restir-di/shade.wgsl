@@ -18,7 +18,6 @@ const VIEW_TARGET_FUNCTION = 4u;
 const VIEW_CONFIDENCE_WEIGHT = 5u;
 const VIEW_LIGHT = 6u;
 const VIEW_DUPLICATES = 7u;
-const VIEW_REJECTED_NEIGHBOURS = 8u;
 
 // How many of the pixels within `DUPLICATES_RADIUS` hold the very sample that this one holds, as a share of them (Wyman and
 // Panteleev 2021, Figure 9).
@@ -56,7 +55,6 @@ fn pixel_radiance(pixel: vec2u) -> vec3f {
         case VIEW_CONFIDENCE_WEIGHT: { return vec3f(first.confidence_weight); }
         case VIEW_LIGHT: { return number_color(first.light); }
         case VIEW_DUPLICATES: { return vec3f(duplicates(pixel, first)); }
-        case VIEW_REJECTED_NEIGHBOURS: { return vec3f(f32(counters.pixel[pixel.y * frame.size.x + pixel.x].z)); }
         default: {}
     }
     var direct = vec3f(0.0);

@@ -11,8 +11,9 @@
 // Report 003, section 4.6, only says that "the two reservoirs" are combined; the faults are read from its sections 4.5 to 7.
 #include "techniques/restir-report/reservoir.wgsl"
 
-// The merged reservoir. `other_surface` is what the other reservoir's pixel sees, in the previous frame if `previous`.
-fn merge(own: ReportReservoir, other: ReportReservoir, surface: Surface, other_surface: Surface, previous: bool,
+// The merged reservoir of a strategy. `other_surface` is what the other reservoir's pixel sees, in the previous frame if
+// `previous`; `pixels` say where both are from.
+fn merge(strategy: u32, pixels: array<vec2u, 2>, own: ReportReservoir, other: ReportReservoir, surface: Surface, other_surface: Surface, previous: bool,
     rng: ptr<function, Rng>) -> ReportReservoir {
     let desired_pdf = target_function(surface, report_sample(other), false);
     // Fault: the other's weights stay those of its own pixel, while W divides by the desired pdf at this one.
@@ -31,6 +32,8 @@ fn merge(own: ReportReservoir, other: ReportReservoir, surface: Surface, other_s
     var stream = stream_empty();
     let own_weight = own_share * count * own.desired_pdf * own.unbiased_contribution_weight;
     let other_weight = other_share * count * assumed_pdf * other.unbiased_contribution_weight;
+    observe_joined(strategy, pixels[0], common_reservoir(own), own_share, own_weight / count);
+    observe_joined(strategy, pixels[1], common_reservoir(other), other_share, other_weight / count);
     stream_update(&stream, report_sample(own), own_weight, random_1(rng));
     let takes_other = stream_update(&stream, report_sample(other), other_weight, random_1(rng));
     let selected_pdf = select(own.desired_pdf, desired_pdf, takes_other);

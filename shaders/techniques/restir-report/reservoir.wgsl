@@ -31,6 +31,10 @@ fn report_sample(reservoir: ReportReservoir) -> LightSample {
     return LightSample(reservoir.light, reservoir.point);
 }
 
+fn common_reservoir(reservoir: ReportReservoir) -> Reservoir {
+    return Reservoir(reservoir.light, reservoir.point, reservoir.unbiased_contribution_weight, reservoir.samples_count);
+}
+
 // A reservoir once everything has been offered to its stream: Weight = WeightSum / (Pdf * SamplesCount) (section 4.3).
 // Where nothing was selected Weight and Pdf are 0. `fault_unguarded_pdf` divides all the same.
 fn finish_reservoir(stream: Stream, desired_pdf: f32, samples_count: f32) -> ReportReservoir {

@@ -28,7 +28,7 @@ fn shade_strategy(surface: Surface, pixel: vec2u, strategy: u32) -> vec3f {
     if !is_finite(weight) {
         return vec3f(weight);
     }
-    return shade_reservoir(surface, Reservoir(reservoir.light, reservoir.point, weight, reservoir.samples_count));
+    return shade_reservoir(surface, common_reservoir(reservoir));
 }
 
 fn pixel_radiance(pixel: vec2u) -> vec3f {

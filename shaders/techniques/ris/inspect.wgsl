@@ -2,12 +2,9 @@
 // One invocation in all. Reads what that pass reads for the inspected pixel. Writes notes on every candidate and on what is
 // selected.
 // Source: that of ris/ris.
-#include "techniques/common/observed.wgsl"
+#include "techniques/common/observed_joining.wgsl"
+#include "techniques/common/observed_value.wgsl"
 #include "techniques/ris/resample.wgsl"
-
-fn observe_result(slot: u32, reservoir: Reservoir, reason: u32) {
-    observe_reservoir(slot, reservoir, reason);
-}
 
 @compute @workgroup_size(1)
 fn main() {
