@@ -197,6 +197,7 @@ fn wrong_names_and_values_are_exit_code_2_and_say_what_is_right() {
     render("missing.glb", &["--preset", "lanz-2025", "--technique", "ris"], "USAGE", "--technique");
     render("missing.glb", &["--pose", "0,0,0,0,0,1,0,1"], "USAGE", "nine numbers");
     render("missing.glb", &["--pose", "0,0,0,0,0,1,0,0,1"], "USAGE", "nine numbers");
+    render("missing.glb", &["--max-depth", "2", "--set", "render.max_depth=3"], "BAD_VALUE", "--set render.max_depth");
     render("missing.glb", &["--view", "beauty"], "UNKNOWN_NAME", "BVH steps");
     render("builtin:cornell", &["--set", "colour=1"], "UNKNOWN_NAME", "colour");
     render("builtin:cornell", &["--set", "film.exposure=bright"], "BAD_VALUE", "exposure");

@@ -1,13 +1,6 @@
 // A camera that orbits, pans, zooms and flies. Pure arithmetic: no events, no page.
 import type { Camera, Vector } from './api.js';
-
-const add = (a: Vector, b: Vector): Vector => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
-const scale = (a: Vector, s: number): Vector => [a[0] * s, a[1] * s, a[2] * s];
-const subtract = (a: Vector, b: Vector): Vector => add(a, scale(b, -1));
-const dot = (a: Vector, b: Vector): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const cross = (a: Vector, b: Vector): Vector => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-const length = (a: Vector): number => Math.sqrt(dot(a, a));
-const normalize = (a: Vector): Vector => scale(a, 1 / (length(a) || 1));
+import { add, cross, dot, length, normalize, scale, subtract } from './vectors.js';
 
 /** Rotates `a` about the unit `axis` by `angle` radians, counter-clockwise as seen from its tip (Rodrigues' formula). */
 function rotate(a: Vector, axis: Vector, angle: number): Vector {

@@ -2,6 +2,7 @@
 import { type Picture, flipOf } from './measure.js';
 import { byId } from './notices.js';
 import type { Compare } from './compare.js';
+import { luminance } from './vectors.js';
 import type { RestirViewer } from './viewer.js';
 
 /** Milliseconds between two maps: each reads pictures back. */
@@ -25,7 +26,7 @@ function signedOf(value: number): Rgb {
   return value > 0 ? [size, size * 0.35, size * 0.1] : [size * 0.1, size * 0.5, size];
 }
 
-const luminanceAt = ({ pixels }: Picture, at: number) => 0.2126 * (pixels[3 * at] ?? 0) + 0.7152 * (pixels[3 * at + 1] ?? 0) + 0.0722 * (pixels[3 * at + 2] ?? 0);
+const luminanceAt = ({ pixels }: Picture, at: number) => luminance([pixels[3 * at] ?? 0, pixels[3 * at + 1] ?? 0, pixels[3 * at + 2] ?? 0]);
 
 /** Signed difference of luminance over the sum of both, -1 to 1 for each pixel. */
 function signedDifference(picture: Picture, other: Picture): Float32Array {

@@ -3,7 +3,7 @@ import type { Errors } from './api.js';
 import { save } from './files.js';
 import type { Picture } from './measure.js';
 import { byId } from './notices.js';
-import { svgElement } from './overlay.js';
+import { svgElement } from './elements.js';
 import type { RestirViewer, Sample } from './viewer.js';
 
 /** One measurement. */

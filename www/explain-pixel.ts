@@ -1,8 +1,6 @@
 // What the inspector saw at a pixel, in plain words.
-import type { Inspection, Note, Vector } from './api.js';
-
-/** Rec. 709. */
-export const luminance = ([r, g, b]: Vector) => 0.2126 * r + 0.7152 * g + 0.0722 * b;
+import type { Inspection, Note } from './api.js';
+import { luminance } from './vectors.js';
 
 /** Three digits, as people write them. */
 export function short(value: number): string {
@@ -42,8 +40,11 @@ function historyWords(seen: Inspection): string | undefined {
   const [result] = of(seen, 'result', 'temporal');
   if (!result) return undefined;
   if (result.reason) return `No history joins: ${result.reason}.`;
-  const history = of(seen, 'domain', 'temporal')[1];
-  return history && `Its history, of pixel ${history.pixel?.join(', ')} one frame ago, joins and counts for ${short(history.confidence_weight)} frames.`;
+  // Domain 0 is the pixel itself; each reservoir of a pixel has domains of its own.
+  const joined = of(seen, 'domain', 'temporal').filter(({ slot }) => slot === 0).slice(1);
+  if (joined.length === 0) return 'No history joins: no pixel of the previous frame showed a surface like this one.';
+  const each = joined.map(({ pixel, confidence_weight: c }) => `of pixel ${pixel?.join(', ')}, one frame ago, with a confidence weight of ${short(c)}`);
+  return `The history joins ${each.join(', and ')}.`;
 }
 
 function neighbourWords(seen: Inspection): string[] {

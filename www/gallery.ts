@@ -1,5 +1,6 @@
 // The gallery: all built-in scenes as pictures, in a dialog that is made, and whose pictures are fetched, when it is first opened.
 import type { SceneInfo } from './api.js';
+import { make } from './elements.js';
 
 const own = 'Our own';
 
@@ -30,12 +31,6 @@ export interface GalleryActions {
   show(scene: string): void;
   /** Lets the user pick files. */
   pick(): void;
-}
-
-function make<Tag extends keyof HTMLElementTagNameMap>(tag: Tag, properties: Partial<HTMLElementTagNameMap[Tag]>, ...children: (Node | string)[]) {
-  const element = Object.assign(document.createElement(tag), properties);
-  element.append(...children);
-  return element;
 }
 
 const address = (file: string) => new URL(`./gallery/${file}`, import.meta.url).href;

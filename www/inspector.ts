@@ -1,8 +1,10 @@
 // The pixel inspector: what the passes saw at a pixel, in words, in the papers' symbols, and as lines in the picture.
 import type { Inspection, Note, Vector } from './api.js';
-import { explainPixel, lastResult, luminance, short, stagesOf } from './explain-pixel.js';
+import { make, svgElement } from './elements.js';
+import { explainPixel, lastResult, short, stagesOf } from './explain-pixel.js';
 import { byId } from './notices.js';
-import { pixelAt, projectLine, svgElement } from './overlay.js';
+import { pixelAt, projectLine } from './overlay.js';
+import { luminance } from './vectors.js';
 import type { RestirViewer } from './viewer.js';
 
 /** Milliseconds between two readings. */
@@ -20,18 +22,12 @@ interface Frame {
   seen: Inspection;
 }
 
-function make<Tag extends keyof HTMLElementTagNameMap>(tag: Tag, text = '', ...children: Node[]): HTMLElementTagNameMap[Tag] {
-  const element = document.createElement(tag);
-  element.append(...(text ? [text] : []), ...children);
-  return element;
-}
-
 function table(head: string[], rows: string[][], caption: string): HTMLElement {
-  const body = rows.map((row) => make('tr', '', ...row.map((cell, at) => make(at === 0 ? 'th' : 'td', cell))));
-  const headings = head.map((cell) => Object.assign(make('th', cell), { scope: 'col' }));
-  const whole = make('table', '', make('caption', caption), make('thead', '', make('tr', '', ...headings)), make('tbody', '', ...body));
+  const body = rows.map((row) => make('tr', {}, ...row.map((cell, at) => make(at === 0 ? 'th' : 'td', cell))));
+  const headings = head.map((cell) => make('th', { scope: 'col' }, cell));
+  const whole = make('table', {}, make('caption', caption), make('thead', {}, make('tr', {}, ...headings)), make('tbody', {}, ...body));
   for (const cell of whole.querySelectorAll<HTMLTableCellElement>('tbody th')) cell.scope = 'row';
-  return Object.assign(make('div', '', whole), { className: 'wide' });
+  return make('div', { className: 'wide' }, whole);
 }
 
 const lightName = ({ sample }: Note) => (sample ? `${sample.light_kind} ${sample.light}` : '–');
@@ -143,7 +139,7 @@ export class Inspector {
     const seen = this.frames.at(-1)?.seen;
     if (!seen) return;
     this.remember();
-    const why = make('ul', '', ...explainPixel(seen).map((text) => make('li', text)));
+    const why = make('ul', {}, ...explainPixel(seen).map((text) => make('li', text)));
     const parts: HTMLElement[] = [why, this.reservoirs(seen), ...this.domains(seen), this.candidates(seen), this.surface(seen), this.history()].filter((part) => part !== undefined);
     for (const part of parts) if (part instanceof HTMLDetailsElement) part.open = this.open.has(part.id);
     byId('inspector-words', HTMLElement).replaceChildren(...parts);
@@ -156,9 +152,7 @@ export class Inspector {
   }
 
   private section(id: string, title: string, ...parts: HTMLElement[]): HTMLDetailsElement {
-    const details = make('details', '', make('summary', title), ...parts);
-    details.id = `inspector-${id}`;
-    return details;
+    return make('details', { id: `inspector-${id}` }, make('summary', title), ...parts);
   }
 
   private reservoirs(seen: Inspection): HTMLElement | undefined {
@@ -169,7 +163,7 @@ export class Inspector {
       const name = results.some((other) => other.slot > 0) ? `${stage}, ${slot + 1}` : stage;
       return [name, lightName(note), short(w), short(c), short(sample?.target_value ?? 0), short(w * (sample?.target_value ?? 0)), note.is_visible ? 'yes' : 'no'];
     });
-    const words = make('p', 'A reservoir holds one sample, the chosen light point y. W stands for 1 / p(y): how much the sample counts. c says for how many frames of candidates it speaks. p̂ is what the sample would give if it is lit; p̂ W is the pixel\'s estimate.');
+    const words = make('p', 'A reservoir holds one sample, the chosen light point y. W stands for 1 / p(y): how much the sample counts. c says for how much it speaks: for so many frames of candidates, in restir-report for so many samples. p̂ is what the sample would give if it is lit; p̂ W is the pixel\'s estimate.');
     return this.section('reservoirs', 'Reservoir after each pass', table(['after', 'y', 'W', 'c', 'p̂(y)', 'p̂ W', 'lit'], rows, 'Reservoir after each pass'), words);
   }
 

@@ -1,10 +1,6 @@
 // What lies over the picture, in its pixels: lines and marks of the inspector, pictures of passes.
 import type { Camera, Vector } from './api.js';
-
-const dot = (a: Vector, b: Vector) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const minus = (a: Vector, b: Vector): Vector => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-const cross = (a: Vector, b: Vector): Vector => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-const unit = (a: Vector): Vector => a.map((value) => value / (Math.hypot(...a) || 1)) as Vector;
+import { cross, dot, normalize, subtract } from './vectors.js';
 
 /** Where a picture of `size` pixels lies in the canvas that shows it whole (object-fit: contain), in CSS pixels of the page. */
 export function shownAt(canvas: HTMLCanvasElement, [width, height]: [number, number]): { left: number; top: number; scale: number } {
@@ -25,14 +21,14 @@ export function pixelAt(canvas: HTMLCanvasElement, size: [number, number], x: nu
  * it lies behind.
  */
 export function projectLine(camera: Camera, size: [number, number], from: Vector, to: Vector): [[number, number], [number, number]] | undefined {
-  const forward = unit(camera.forward);
-  const right = unit(cross(forward, camera.up));
+  const forward = normalize(camera.forward);
+  const right = normalize(cross(forward, camera.up));
   const up = cross(right, forward);
   const [width, height] = size;
   const flat = camera.half_height !== undefined;
   const halfHeight = camera.half_height ?? Math.tan((camera.vertical_fov ?? 0.8) / 2);
   const inView = (point: Vector): Vector => {
-    const offset = minus(point, camera.position);
+    const offset = subtract(point, camera.position);
     return [dot(offset, right), dot(offset, up), dot(offset, forward)];
   };
   let [a, b] = [inView(from), inView(to)];
@@ -51,11 +47,4 @@ export function projectLine(camera: Camera, size: [number, number], from: Vector
     return [width / 2 + ((x / w) * height) / 2, height / 2 - ((y / w) * height) / 2];
   };
   return [place(a), place(b)];
-}
-
-export function svgElement(tag: string, attributes: Record<string, string | number>, text?: string): SVGElement {
-  const element = document.createElementNS('http://www.w3.org/2000/svg', tag);
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
-  if (text !== undefined) element.textContent = text;
-  return element;
 }

@@ -1,6 +1,7 @@
 // The settings panel, generated from the parameter declarations.
 import type { BiasNote, Parameter } from './api.js';
 import { isDefault } from './description.js';
+import { make } from './elements.js';
 
 export interface Group {
   title: string;
@@ -11,10 +12,6 @@ export interface Group {
 
 /** Tells of a new value, or with undefined of a return to the default. */
 export type ParameterChanged = (key: string, value: string | undefined) => void;
-
-function make<Tag extends keyof HTMLElementTagNameMap>(tag: Tag, properties: Partial<HTMLElementTagNameMap[Tag]>): HTMLElementTagNameMap[Tag] {
-  return Object.assign(document.createElement(tag), properties);
-}
 
 /** Fills a menu with (value, text) pairs and selects `chosen`, which is added where it is not among them. */
 export function fillMenu(menu: HTMLSelectElement, entries: [string, string][], chosen: string): void {

@@ -1,6 +1,6 @@
 // The last minute of frames: the time of each pass as stacked areas, and the figures of one reading at a time.
 import { byId, withUnit } from './notices.js';
-import { svgElement } from './overlay.js';
+import { svgElement } from './elements.js';
 import { type Reading, layersOf } from './readings.js';
 
 /** So many readings are kept. */

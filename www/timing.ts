@@ -1,15 +1,10 @@
 // Where a frame's time goes on the GPU: a bar of its passes, and their figures.
 import type { Stats } from './api.js';
+import { make } from './elements.js';
 import { byId } from './notices.js';
 
 /** Passes beyond these share the last colour. */
 const colours = 8;
-
-const make = (tag: string, properties: Partial<HTMLElement>, ...children: Node[]) => {
-  const element = Object.assign(document.createElement(tag), properties);
-  element.append(...children);
-  return element;
-};
 
 /** Shows the passes of the last frame; says so where the device cannot measure them. */
 export function showTiming({ passes }: Stats): void {

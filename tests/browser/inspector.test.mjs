@@ -21,13 +21,19 @@ const inspectorSays = (page, ...parts) =>
   page.waitForFunction((wanted) => wanted.every((part) => document.getElementById('inspector').textContent.includes(part)), { polling: 50 }, parts);
 
 /** The inspector's tables, as rows of numbers and words, and its marks in the picture: all of one reading, for the next may come between two questions. */
-const reading = (page) =>
-  page.evaluate(() => {
+const reading = (page, stage) =>
+  page.evaluate((joining) => {
     const value = (text) => (Number.isNaN(Number(text)) ? text : Number(text));
     const rows = (id) => [...document.querySelectorAll(`#inspector-${id} tbody tr`)].map((row) => [...row.cells].map(({ textContent }) => value(textContent)));
     const marks = (which) => document.querySelectorAll(`#marks ${which}`).length;
-    return { passes: rows('reservoirs'), joined: rows('spatial-1'), circles: marks('circle.neighbour'), chosen: marks('line:is(.chosen, .shadowed)') };
-  });
+    return {
+      passes: rows('reservoirs'),
+      joined: rows(joining),
+      circles: marks('circle.neighbour'),
+      histories: marks('circle.history'),
+      chosen: marks('line:is(.chosen, .shadowed)'),
+    };
+  }, stage);
 
 test('a click on a pixel tells what the passes saw there, and the figures add up', () =>
   open('?scene=cornell&size=48x36&spatial_confidence_limit=1000&indirect=false', async (page) => {
@@ -37,7 +43,7 @@ test('a click on a pixel tells what the passes saw there, and the figures add up
     await inspectorSays(page, 'was chosen', 'Of 32 candidates', 'neighbour', 'history');
     const where = (await text(page, 'inspector-where')).match(/\d+/g).map(Number);
     assert.deepEqual(where, [Math.floor((560 - (1280 - 800 * (48 / 36)) / 2) / (800 / 36)), Math.floor(660 / (800 / 36))]);
-    const { passes, joined, circles, chosen } = await reading(page);
+    const { passes, joined, circles, chosen } = await reading(page, 'spatial-1');
     assert.deepEqual(passes.map(([name]) => name), ['initial', 'temporal', 'spatial 1']);
     for (const [, , w, , target, estimate] of passes) assert.ok(Math.abs(w * target - estimate) <= 0.02 * estimate + 1e-3, `${w} * ${target} = ${estimate}`);
     // W = sum of w over p-hat of what was chosen: of the neighbours that joined.
@@ -59,6 +65,26 @@ test('a click on a pixel tells what the passes saw there, and the figures add up
     assert.equal(await page.$$eval('#marks *', (all) => all.length), 0);
     assert.equal(await isHidden(page, 'inspector'), true);
   }));
+
+for (const [technique, passes, stage] of [
+  ['restir-di-decoupled', ['initial', 'temporal'], 'temporal'],
+  ['restir-report', ['initial, 1', 'initial, 2', 'temporal, 1', 'temporal, 2', 'spatial 1, 1', 'spatial 1, 2'], 'temporal'],
+]) {
+  test(`${technique} says what it saw at a pixel`, () =>
+    open(`?scene=cornell-64&size=48x36&accumulate=no&technique=${technique}&indirect=false`, async (page) => {
+      await page.click('#inspect');
+      await page.mouse.click(560, 660);
+      await inspectorSays(page, 'was chosen', 'candidates', 'The history joins of pixel');
+      const seen = await reading(page, stage);
+      assert.deepEqual(seen.passes.map(([name]) => name), passes);
+      for (const [, , w, , target, estimate] of seen.passes) assert.ok(Math.abs(w * target - estimate) <= 0.02 * estimate + 1e-3, `${w} * ${target} = ${estimate}`);
+      assert.ok(seen.joined.length >= 2 && seen.joined[0][0] === 'this pixel', JSON.stringify(seen.joined));
+      const sum = seen.joined.reduce((total, row) => total + row[6], 0);
+      const [, , w, , target] = seen.passes.find(([name]) => name.startsWith(stage));
+      assert.ok(Math.abs(w * target - sum) <= 0.03 * sum + 1e-3, `${w * target} and ${sum}`);
+      assert.ok(seen.histories >= 1, 'the history is drawn');
+    }));
+}
 
 test('a drag while inspecting still turns the camera, and chooses no pixel', () =>
   open('?scene=cornell&size=24x18&technique=ris', async (page) => {

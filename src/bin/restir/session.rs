@@ -14,6 +14,9 @@ use std::time::Instant;
 /// The parameter that turns the environment, which is then something that moves.
 const TURN: &str = "render.environment_rotation_rate";
 
+/// The parameter that --max-depth sets.
+const MAX_DEPTH: &str = "render.max_depth";
+
 /// What is rendered, and how.
 #[derive(clap::Args)]
 pub struct Options {
@@ -107,6 +110,9 @@ impl Session {
             technique.spec(key).map_or(Ok(0), |spec| spec.parse(value)).map_err(Failure::from_option)?;
         }
         Shown::find(&options.view, technique.views).map_err(Failure::from_option)?;
+        if options.max_depth.is_some() && options.set.iter().any(|(key, _)| key == MAX_DEPTH) {
+            return Err(Failure::usage("max-depth", format!("--set {MAX_DEPTH} says it as well")));
+        }
         (technique.check)(&settings).map_err(Failure::from_option)?;
         let flat = scene::open(name, &options.choice, Some((&options.lighting, options.seed)))?;
         report::warnings(&flat.warnings);
@@ -121,11 +127,11 @@ impl Session {
         let adapter = gpu.adapter_name();
         let mut renderer = Renderer::new(gpu, flat, options.size)?;
         renderer.set_technique(technique.id).map_err(Failure::from_option)?;
-        if let Some(depth) = options.max_depth {
-            renderer.set("render.max_depth", &depth.to_string()).map_err(Failure::from_option)?;
-        }
         for (key, value) in settings {
             renderer.set(key, value).map_err(Failure::from_option)?;
+        }
+        if let Some(depth) = options.max_depth {
+            renderer.set(MAX_DEPTH, &depth.to_string()).map_err(Failure::from_option)?;
         }
         if let Some(animation) = &options.animation {
             renderer.set_animation(animation).map_err(Failure::from_option)?;
