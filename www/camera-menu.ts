@@ -29,7 +29,9 @@ export class CameraMenu {
   }
 
   private get bookmarks(): Bookmarks {
-    return new Bookmarks(this.view.settings.scene ?? this.view.scene?.source.name ?? '');
+    const { scene = this.view.scene?.source.name ?? '', sceneIndex } = this.view.settings;
+    // A file may hold several scenes; the first goes by the file's name alone.
+    return new Bookmarks(sceneIndex ? `${scene}#${sceneIndex}` : scene);
   }
 
   private show(): void {

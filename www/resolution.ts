@@ -23,6 +23,11 @@ export class Resolution {
     this.automatic.startAt(scale);
   }
 
+  /** Another scene: what frames took says nothing about what comes. */
+  forget(): void {
+    this.automatic.forget();
+  }
+
   /** Milliseconds that a frame may take. */
   set budget(milliseconds: number) {
     if (milliseconds === this.automatic.milliseconds) return;

@@ -802,6 +802,7 @@ export class RestirViewer extends EventTarget {
     const take = (viewer: Viewer): void => {
       this.shown = { ...given, cameras: camerasOf(viewer), report: reportOf(viewer) };
       this.flat = flat;
+      this.resolution.forget();
       const { scene: sceneIndex, variant } = source.kind === 'builtin' ? {} : source.choice;
       Object.assign(this.settings, { sceneIndex, variant });
       this.settings.environment = surroundings?.bytes ? undefined : surroundings?.name;
