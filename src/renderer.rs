@@ -586,9 +586,7 @@ impl Renderer {
         recorder.share("previous_visibility", &self.visibility[1 - parity]);
         let pass = recorder.pass(&table::SCENE_VISIBILITY).inspected_by(&table::SCENE_INSPECT);
         pass.bind("visibility_out", &self.visibility[parity]).dispatch_over(size)?;
-        if let Some(pass) = recorder.illustration(&table::SCENE_SEEN) {
-            pass.dispatch_over(size)?;
-        }
+        recorder.illustrate(&table::SCENE_SEEN, &[], size)?;
         if self.shown.runs_technique() {
             self.technique.record(&mut recorder, size)?;
         } else {

@@ -127,13 +127,22 @@ impl<'a> Recorder<'a> {
     }
 
     /// While a frame is dissected: a pass whose `radiance_out` shows what the last pass has written, where that is no picture itself.
-    pub fn illustration<'r>(&'r mut self, shader: &'static Shader) -> Option<Pass<'r, 'a>> {
+    fn illustration<'r>(&'r mut self, shader: &'static Shader) -> Option<Pass<'r, 'a>> {
         let (_, easel) = self.dissection.as_ref()?;
         let easel: &'a Easel = easel;
         let mut bound: Vec<(&'r str, Resource<'r>)> = self.shared.clone();
         bound.push(("radiance_out", (&easel.radiance).into()));
         bound.push(("counters", (&easel.counters).into()));
         Some(Pass { recorder: self, shader, bound, illustrates: true, inspection: None })
+    }
+
+    /// While a frame is dissected: has `shader` show, over `size` pixels, what the last pass has written, with this bound to it.
+    ///
+    /// # Errors
+    /// `SHADER` if something the shader needs was not bound.
+    pub fn illustrate(&mut self, shader: &'static Shader, bound: &[(&str, Resource<'_>)], size: UVec2) -> Result<()> {
+        let Some(pass) = self.illustration(shader) else { return Ok(()) };
+        bound.iter().fold(pass, |pass, &(name, resource)| pass.bind(name, resource)).dispatch_over(size)
     }
 
     fn run(&mut self, shader: &'static Shader, bound: &[(&str, Resource<'_>)], workgroups: [u32; 3]) -> Result<()> {

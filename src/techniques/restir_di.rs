@@ -290,15 +290,13 @@ impl Technique for RestirDi {
         // Indirect light draws its lights as the path tracer does.
         recorder.features = features;
         // What reservoirs stand for, where the frame is taken apart.
-        let show = |recorder: &mut Recorder<'_>, reservoirs: &wgpu::Buffer| match recorder
-            .illustration(&table::RESTIR_DI_SHADE)
-        {
-            Some(pass) => pass
-                .bind("params", &self.direct_only)
-                .bind("reservoirs", reservoirs)
-                .bind("indirect_radiance", &buffers.indirect)
-                .dispatch_over(size),
-            None => Ok(()),
+        let show = |recorder: &mut Recorder<'_>, reservoirs: &wgpu::Buffer| {
+            let bound = [
+                ("params", (&self.direct_only).into()),
+                ("reservoirs", reservoirs.into()),
+                ("indirect_radiance", (&buffers.indirect).into()),
+            ];
+            recorder.illustrate(&table::RESTIR_DI_SHADE, &bound, size)
         };
         show(recorder, &reservoirs[current])?;
         // Without a history the pass would only copy; and the first picture need not wait for its pipeline.

@@ -201,15 +201,13 @@ impl Technique for RestirReport {
         let mut current = (history + 1) % 3;
         let mut spare = (history + 2) % 3;
         // What reservoirs stand for, where the frame is taken apart.
-        let show = |recorder: &mut Recorder<'_>, reservoirs: &wgpu::Buffer| match recorder
-            .illustration(&table::RESTIR_REPORT_SHADE)
-        {
-            Some(pass) => pass
-                .bind("params", &self.direct_only)
-                .bind("reservoirs", reservoirs)
-                .bind("indirect_radiance", &buffers.indirect)
-                .dispatch_over(size),
-            None => Ok(()),
+        let show = |recorder: &mut Recorder<'_>, reservoirs: &wgpu::Buffer| {
+            let bound = [
+                ("params", (&self.direct_only).into()),
+                ("reservoirs", reservoirs.into()),
+                ("indirect_radiance", (&buffers.indirect).into()),
+            ];
+            recorder.illustrate(&table::RESTIR_REPORT_SHADE, &bound, size)
         };
 
         recorder
