@@ -7,6 +7,7 @@ use crate::environment_pyramid::EnvironmentPyramid;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::data_texture::DataTexture;
+use crate::gpu::memory::bytes_of;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::SceneFeatures;
 use crate::pace::{Pace, SLICE_BYTES};
@@ -176,6 +177,20 @@ impl GpuScene {
             }
             self.motion = Some(motion);
         }
+    }
+
+    /// Bytes on the device.
+    pub fn memory(&self) -> u64 {
+        let [first, rest] = &self.triangles;
+        let records = [&self.attributes, &self.materials, &self.material_extensions, &self.instances];
+        let views = records.into_iter().map(|records| &records.view).chain(&self.textures).chain([
+            &self.environment_radiance,
+            &self.environment_alias,
+            &self.no_pyramid,
+        ]);
+        let views = views.chain(self.pyramid.as_ref().map(|pyramid| &pyramid.view));
+        let buffers = [&self.nodes, first, rest, &self.lights];
+        bytes_of(&buffers.map(Into::into)) + bytes_of(&views.map(Into::into).collect::<Vec<_>>())
     }
 
     /// Whether the environment is sampled by its pyramid, which [`GpuScene::record`] then makes, or by its alias table.

@@ -3,6 +3,7 @@
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::gpu::memory::bytes_of;
 use crate::gpu::recorder::Recorder;
 use crate::gpu_struct;
 use crate::scene::gpu_types::{
@@ -269,6 +270,11 @@ pub struct Inspector {
 }
 
 impl Inspector {
+    /// Bytes on the device.
+    pub fn memory(&self) -> u64 {
+        bytes_of(&[(&self.uniform).into(), (&self.trace).into()])
+    }
+
     /// An inspector of `pixel`.
     ///
     /// # Errors

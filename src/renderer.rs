@@ -5,6 +5,7 @@ use crate::film::{Counters, Film};
 use crate::frame::{Frame, camera_view};
 use crate::gpu::Gpu;
 use crate::gpu::dissection::{Dissection, Easel};
+use crate::gpu::memory::{Memory, bytes_of};
 use crate::gpu::recorder::{PassTime, Recorder, Timer};
 use crate::gpu::shader::table;
 use crate::gpu_scene::{GpuScene, environment_light, sun_light};
@@ -193,6 +194,19 @@ impl Renderer {
     /// The film.
     pub fn film(&self) -> &Film {
         &self.film
+    }
+
+    /// Bytes on the device.
+    pub fn memory(&self) -> Memory {
+        let [this, previous] = &self.visibility;
+        let own = [this, previous, &self.albedo_depth, &self.normal, &self.motion].map(Into::into);
+        let timers = [&self.timer, &self.display_timer].into_iter().flatten().map(Timer::memory).sum::<u64>();
+        Memory {
+            scene: self.gpu_scene.memory(),
+            film: self.film.memory() + bytes_of(&own) + bytes_of(&[(&self.frame_uniform).into()]) + timers,
+            technique: self.technique.memory(),
+            inspector: self.inspector.as_ref().map_or(0, Inspector::memory),
+        }
     }
 
     /// Picture size in pixels.

@@ -500,3 +500,34 @@ fn biases_are_those_of_the_settings_as_they_are() {
         assert_eq!(!renderer.biases().is_empty(), biased, "{name} = {value}: {:?}", renderer.biases());
     }
 }
+
+/// What a renderer says it holds on the device is what the allocator of the device has given it: how it grows with the picture, and that
+/// nothing stays of another technique or size.
+#[test]
+fn memory_is_what_the_device_has_given() {
+    let gpu = fresh_gpu();
+    let given = |gpu: &restir::Gpu| {
+        let report = gpu.device.generate_allocator_report().expect("Vulkan tells");
+        report.allocations.iter().map(|allocation| allocation.size).sum::<u64>()
+    };
+    let mut renderer = renderer(&gpu, support::builtin("cornell"), SIZE, "normals", &[]);
+    for info in techniques::ALL {
+        let mut seen = Vec::new();
+        for side in [64, 512, 64] {
+            renderer.set_technique(info.id).expect("a technique");
+            renderer.resize([side, side].into()).expect("a size");
+            // What was let go of is freed by a device that is idle; a frame is not needed, for all is made before.
+            pollster::block_on(renderer.wait()).expect("a device that is idle");
+            seen.push((renderer.memory(), given(&gpu)));
+        }
+        let [(small, given_small), (large, given_large), (again, _)] = seen[..] else { panic!("three sizes") };
+        assert_eq!(small, again, "{}", info.id);
+        assert_eq!((small.scene, small.inspector), (large.scene, 0), "{}", info.id);
+        // Radiance, sum and count, display, two visibility buffers, three pictures of first surfaces.
+        assert_eq!(large.film - small.film, (512 * 512 - 64 * 64) * (16 + 16 + 4 + 2 * 16 + 3 * 16), "{}", info.id);
+        let [grown, given] = [large.total() - small.total(), given_large - given_small].map(|bytes| bytes as f64);
+        assert!((grown / given - 1.0).abs() < 0.02, "{}: {grown} bytes more, the device gave {given}", info.id);
+    }
+    renderer.inspect(Some([1, 1].into())).expect("a pixel");
+    assert!(renderer.memory().inspector > 100_000);
+}

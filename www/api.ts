@@ -73,12 +73,32 @@ export interface Camera {
 /** Where a camera is and where it looks, in the scene's units; the directions need not be of length 1. */
 export type Pose = Pick<Camera, 'position' | 'forward' | 'up'>;
 
-/** What `Viewer.stats()` resolves to: rays and passes of the last frame, `nan` and `inf` since the picture began. */
+/** Bytes that are held now. */
+export interface Memory {
+  /** On the graphics device, for the scene: geometry, materials, textures, lights, environment. */
+  scene: number;
+  /** On the device, for the picture: what was averaged, what is displayed, first surfaces. */
+  film: number;
+  /** On the device, for the technique: its reservoirs. */
+  technique: number;
+  /** On the device, for the inspected pixel's notes; 0 while none is inspected. */
+  inspector: number;
+  /** WebAssembly's memory on the page's thread, of all viewers together. It never shrinks; a new scene uses again what is free in it. */
+  wasm: number;
+  /** JavaScript's heap, all of the page's, where the browser tells. */
+  heap?: number;
+}
+
+/**
+ * What `Viewer.stats()` resolves to: rays and passes of the last frame, `nan` and `inf` since the picture began, memory now. `heap` comes
+ * from the page.
+ */
 export interface Stats {
   rays: number;
   nan: number;
   inf: number;
   passes: { name: string; ms: number }[];
+  memory: Memory;
 }
 
 /** Distances of the picture from the reference, of linear radiance. */

@@ -1,15 +1,28 @@
-// Where a frame's time goes on the GPU: a bar of its passes, and their figures.
-import type { Stats } from './api.js';
+// Where a frame's time goes on the GPU: a bar of its passes, and their figures; and the memory that is held.
+import type { Memory, Stats } from './api.js';
 import { make } from './elements.js';
 import { byId } from './notices.js';
 
 /** Passes beyond these share the last colour. */
 const colours = 8;
 
-/** Shows the passes of the last frame; says so where the device cannot measure them. */
-export function showTiming({ passes }: Stats): void {
+/** Bytes as megabytes: millions. */
+const mega = (bytes: number) => (bytes / 1e6).toFixed(1);
+
+/** `GPU 12.3 MB (scene 8.1, film 2.0, technique 2.2), WebAssembly 6.4 MB`. */
+function memoryText({ scene, film, technique, inspector, wasm, heap }: Memory): string {
+  const parts = [`scene ${mega(scene)}`, `film ${mega(film)}`, `technique ${mega(technique)}`, ...(inspector > 0 ? [`inspector ${mega(inspector)}`] : [])];
+  const script = heap === undefined ? '' : `, JavaScript ${mega(heap)} MB`;
+  return `GPU ${mega(scene + film + technique + inspector)} MB (${parts.join(', ')}), WebAssembly ${mega(wasm)} MB${script}`;
+}
+
+/** Shows the passes of the last frame, and memory; says so where the device cannot measure passes. */
+export function showTiming({ passes, memory }: Stats): void {
   const root = byId('timing', HTMLDetailsElement);
   if (!root.open) return;
+  const held = byId('memory', HTMLElement);
+  held.textContent = memoryText(memory);
+  held.hidden = false;
   const total = passes.reduce((sum, { ms }) => sum + ms, 0);
   const colour = (index: number) => `pass-${Math.min(index, colours - 1)}`;
   const bar = make('div', { className: 'bar', ariaHidden: 'true' });

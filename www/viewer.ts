@@ -1,6 +1,6 @@
 // A scene on a canvas: loads it, renders it, moves its camera, and starts again when the device is lost. Knows no page.
 import { findAdapter } from './adapter.js';
-import type { BiasNote, Camera, Description, DissectedPass, Errors, Failure, Inspection, Pose, SceneReport, Stats, ViewLegend } from './api.js';
+import type { BiasNote, Camera, Description, DissectedPass, Errors, Failure, Inspection, Memory, Pose, SceneReport, Stats, ViewLegend } from './api.js';
 import { OrbitCamera } from './camera.js';
 import { Controls } from './controls.js';
 import { description, isDefault, normalised, parameterOf, techniqueOf } from './description.js';
@@ -19,7 +19,7 @@ import type { Stage } from './stages.js';
 import { type Settings, defaultSettings, writeQuery } from './url-state.js';
 import { compileWasm, startWasm } from './wasm.js';
 
-export type { BiasNote, Camera, Choice, Contents, Description, DissectedPass, Errors, Failure, Inspection, Picture, Pose, SceneReport, Settings, Stage, Stats };
+export type { BiasNote, Camera, Choice, Contents, Description, DissectedPass, Errors, Failure, Inspection, Memory, Picture, Pose, SceneReport, Settings, Stage, Stats };
 export { RestirError };
 
 /** One frame. */
@@ -599,9 +599,14 @@ export class RestirViewer extends EventTarget {
     return url.href;
   }
 
-  /** Rays and milliseconds of each pass in the last frame. Passes are empty where the device has no timestamps. */
+  /** Rays and milliseconds of each pass in the last frame, and memory in bytes. Passes are empty where the device has no timestamps. */
   timings(): Promise<Stats> {
-    return this.call(async (viewer) => JSON.parse((await viewer.stats()) as string) as Stats);
+    return this.call(async (viewer) => {
+      const stats = JSON.parse((await viewer.stats()) as string) as Stats;
+      // Not of the standard: Chromium tells.
+      const { memory } = performance as Performance & { memory?: { usedJSHeapSize: number } };
+      return memory ? { ...stats, memory: { ...stats.memory, heap: memory.usedJSHeapSize } } : stats;
+    });
   }
 
   /** The averaged picture as it is now. */

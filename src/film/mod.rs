@@ -3,6 +3,7 @@
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::gpu::memory::bytes_of;
 use crate::gpu::recorder::Recorder;
 use crate::gpu::shader::table;
 use crate::gpu_struct;
@@ -112,6 +113,19 @@ impl Film {
     /// Picture size in pixels.
     pub fn size(&self) -> UVec2 {
         self.size
+    }
+
+    /// Bytes on the device.
+    pub fn memory(&self) -> u64 {
+        let Film { size: _, uniforms, radiance, accumulation, exposure_state, display, counters } = self;
+        bytes_of(&[
+            uniforms.into(),
+            radiance.into(),
+            accumulation.into(),
+            exposure_state.into(),
+            display.into(),
+            counters.into(),
+        ])
     }
 
     /// Makes room to count by the pixel, or gives it back.

@@ -3,6 +3,7 @@
 pub mod albedo_table;
 pub mod data_texture;
 pub mod dissection;
+pub mod memory;
 #[cfg(not(target_arch = "wasm32"))]
 mod plant;
 pub mod readback;

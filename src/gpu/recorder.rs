@@ -50,6 +50,11 @@ impl Timer {
         self.names.clear();
     }
 
+    /// Bytes of the queries' results on the device.
+    pub fn memory(&self) -> u64 {
+        self.resolved.size()
+    }
+
     /// Times of the last recorded frame.
     ///
     /// # Errors

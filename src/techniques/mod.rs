@@ -158,6 +158,9 @@ pub trait Technique {
     /// `LIMIT` if the device cannot hold them.
     fn prepare(&mut self, gpu: &Gpu, size: UVec2) -> Result<()>;
 
+    /// Bytes on the device of what it owns: see [`bytes_of`](crate::gpu::memory::bytes_of).
+    fn memory(&self) -> u64;
+
     /// Records one frame. Bound already: the scene, `frame`, `visibility`, `previous_visibility`, `counters` and
     /// `radiance_out`, which it must write.
     ///

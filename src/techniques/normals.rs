@@ -2,7 +2,7 @@
 
 use super::{Technique, TechniqueInfo};
 use crate::error::Result;
-use crate::gpu::{Gpu, recorder::Recorder, shader::table};
+use crate::gpu::{Gpu, memory::bytes_of, recorder::Recorder, shader::table};
 use crate::params::Params;
 use glam::UVec2;
 
@@ -49,6 +49,9 @@ impl Technique for Normals {
     fn prepare(&mut self, gpu: &Gpu, _size: UVec2) -> Result<()> {
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&self.params));
         Ok(())
+    }
+    fn memory(&self) -> u64 {
+        bytes_of(&[(&self.uniform).into()])
     }
     fn record(&mut self, recorder: &mut Recorder<'_>, size: UVec2) -> Result<()> {
         recorder.pass(&table::NORMALS_NORMALS).bind("params", &self.uniform).dispatch_over(size)

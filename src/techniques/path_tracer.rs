@@ -36,6 +36,9 @@ impl Technique for PathTracer {
     fn prepare(&mut self, _gpu: &Gpu, _size: UVec2) -> Result<()> {
         Ok(())
     }
+    fn memory(&self) -> u64 {
+        0
+    }
     fn record(&mut self, recorder: &mut Recorder<'_>, size: UVec2) -> Result<()> {
         recorder.pass(&table::PATH_TRACER_TRACE).dispatch_over(size)
     }

@@ -3,7 +3,7 @@
 
 use super::{Bias, MAX_DEPTH, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold, candidates, reuse, views};
 use crate::error::Result;
-use crate::gpu::{Gpu, recorder::Recorder, shader::table};
+use crate::gpu::{Gpu, memory::bytes_of, recorder::Recorder, shader::table};
 use crate::params::Params;
 use crate::view::View;
 use glam::UVec2;
@@ -263,6 +263,13 @@ impl Technique for RestirDi {
             indirect: gpu.texture("restir-di.indirect", size, wgpu::TextureFormat::Rgba32Float),
         });
         Ok(())
+    }
+
+    fn memory(&self) -> u64 {
+        let own = [&self.uniform, &self.direct_only].into_iter().chain(&self.pass_indices);
+        let reservoirs = self.buffers.iter().flat_map(|buffers| &buffers.reservoirs);
+        let indirect = self.buffers.iter().map(|buffers| (&buffers.indirect).into());
+        bytes_of(&own.chain(reservoirs).map(Into::into).chain(indirect).collect::<Vec<_>>())
     }
 
     fn record(&mut self, recorder: &mut Recorder<'_>, size: UVec2) -> Result<()> {

@@ -2,7 +2,7 @@
 
 use super::{Bias, MAX_DEPTH, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold, views};
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, recorder::Recorder, shader::table};
+use crate::gpu::{Gpu, memory::bytes_of, recorder::Recorder, shader::table};
 use crate::params::Params;
 use crate::view::View;
 use glam::UVec2;
@@ -301,6 +301,16 @@ impl Technique for RestirDiDecoupled {
             indirect: gpu.texture("restir-di-decoupled.indirect", size, wgpu::TextureFormat::Rgba32Float),
         });
         Ok(())
+    }
+
+    fn memory(&self) -> u64 {
+        let of = |buffers: &Buffers| {
+            let Buffers { tile_lights, tile_inverse_pdfs, selections, reservoirs, domains, indirect, .. } = buffers;
+            let once = [tile_lights, tile_inverse_pdfs, selections];
+            let all = once.into_iter().chain(reservoirs).chain(domains).map(Into::into);
+            bytes_of(&all.chain([indirect.into()]).collect::<Vec<_>>())
+        };
+        bytes_of(&[(&self.uniform).into()]) + self.buffers.as_ref().map_or(0, of)
     }
 
     fn record(&mut self, recorder: &mut Recorder<'_>, size: UVec2) -> Result<()> {

@@ -2,7 +2,7 @@
 
 use super::{Bias, MAX_DEPTH, NO_INDIRECT, Technique, TechniqueInfo, biases_that_hold, views};
 use crate::error::Result;
-use crate::gpu::{Gpu, recorder::Recorder, shader::table};
+use crate::gpu::{Gpu, memory::bytes_of, recorder::Recorder, shader::table};
 use crate::params::Params;
 use crate::view::View;
 use glam::UVec2;
@@ -191,6 +191,13 @@ impl Technique for RestirReport {
             indirect: gpu.texture("restir-report.indirect", size, wgpu::TextureFormat::Rgba32Float),
         });
         Ok(())
+    }
+
+    fn memory(&self) -> u64 {
+        let reservoirs = self.buffers.iter().flat_map(|buffers| &buffers.reservoirs);
+        let indirect = self.buffers.iter().map(|buffers| (&buffers.indirect).into());
+        let buffers = [&self.uniform, &self.direct_only].into_iter().chain(reservoirs);
+        bytes_of(&buffers.map(Into::into).chain(indirect).collect::<Vec<_>>())
     }
 
     fn record(&mut self, recorder: &mut Recorder<'_>, size: UVec2) -> Result<()> {

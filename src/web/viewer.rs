@@ -11,6 +11,9 @@ use glam::{UVec2, Vec3};
 use std::pin::Pin;
 use wasm_bindgen::prelude::*;
 
+/// Bytes by which WebAssembly memory grows.
+const WASM_PAGE: usize = 1 << 16;
+
 /// Runs once when the module is loaded: a panic becomes a console error with a stack.
 #[wasm_bindgen(start)]
 pub fn start() {
@@ -251,12 +254,15 @@ impl Viewer {
         self.renderer.accumulated_frames()
     }
 
-    /// Rays, left-out samples and pass times of the last frame, as JSON.
+    /// Rays, left-out samples and pass times of the last frame, and bytes held on the device and by the modules' memory, as JSON.
     pub fn stats(&self) -> js_sys::Promise {
         let (counters, passes) = (self.renderer.counters(), self.renderer.pass_times());
+        let mut memory = serde_json::json!(self.renderer.memory());
+        memory["wasm"] = (core::arch::wasm32::memory_size(0) * WASM_PAGE).into();
         wasm_bindgen_futures::future_to_promise(async move {
             let mut stats = serde_json::json!(counters.await.js()?);
             stats["passes"] = serde_json::json!(passes.await.js()?);
+            stats["memory"] = memory;
             Ok(stats.to_string().into())
         })
     }
