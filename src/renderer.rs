@@ -6,7 +6,7 @@ use crate::frame::{Frame, camera_view};
 use crate::gpu::Gpu;
 use crate::gpu::dissection::{Dissection, Easel};
 use crate::gpu::memory::{Memory, bytes_of};
-use crate::gpu::recorder::{PassTime, Recorder, Timer};
+use crate::gpu::recorder::{PassTime, Recorder, Recording, Timer};
 use crate::gpu::shader::table;
 use crate::gpu_scene::{GpuScene, environment_light, sun_light};
 use crate::inspect::{Inspection, Inspector};
@@ -106,6 +106,8 @@ pub struct Renderer {
     accumulated: u32,
     restart_film: bool,
     inspector: Option<Inspector>,
+    /// A frame that was begun and is to be finished.
+    begun: Option<Recording>,
     /// One line for each shader whose last edit did not compile (debug builds).
     pub shader_problems: Vec<String>,
 }
@@ -163,6 +165,7 @@ impl Renderer {
             accumulated: 0,
             restart_film: true,
             inspector: None,
+            begun: None,
             shader_problems: Vec::new(),
             scene,
             gpu,
@@ -516,7 +519,42 @@ impl Renderer {
     /// # Errors
     /// `LIMIT` if the technique's buffers do not fit; `DEVICE` for an error the device has reported.
     pub fn render_frame(&mut self) -> Result<()> {
-        self.render(None)
+        self.record(None, false)?.submit();
+        self.note_frame()
+    }
+
+    /// Begins a frame with its display, to be ended by [`Renderer::finish_frame`]. Returns the number of pipelines that are to be made for
+    /// it, each by a call of [`Renderer::make_pipeline`], between which a page can draw. Nothing else may be asked of the renderer meanwhile.
+    ///
+    /// # Errors
+    /// As [`Renderer::render_frame`].
+    pub fn begin_frame(&mut self) -> Result<usize> {
+        let recording = self.record(None, true)?.finish();
+        let unmade = recording.unmade(&self.gpu);
+        self.begun = Some(recording);
+        Ok(unmade)
+    }
+
+    /// Makes the next of the pipelines that the begun frame waits for. Resolves when the device has compiled it.
+    pub fn make_pipeline(&mut self) -> impl Future<Output = ()> + use<> {
+        if let Some(recording) = &mut self.begun {
+            recording.make_pipeline(&self.gpu);
+        }
+        self.gpu.taken_in()
+    }
+
+    /// Submits what is left of the begun frame.
+    ///
+    /// # Errors
+    /// `DEVICE` for an error the device has reported.
+    pub fn finish_frame(&mut self) -> Result<()> {
+        match self.begun.take() {
+            Some(recording) => {
+                recording.submit(&self.gpu);
+                self.note_frame()
+            }
+            None => Ok(()),
+        }
     }
 
     /// Renders one frame as [`Renderer::render_frame`] does, its display included, and keeps what each pass has written.
@@ -526,7 +564,8 @@ impl Renderer {
     pub fn dissect_frame(&mut self) -> Result<Dissection> {
         let mut dissection = Dissection::new(self.size(), self.film.exposure_state().clone());
         let easel = Easel::new(&self.gpu, self.size())?;
-        self.render(Some((&mut dissection, &easel)))?;
+        self.record(Some((&mut dissection, &easel)), true)?.submit();
+        self.note_frame()?;
         Ok(dissection)
     }
 
@@ -560,7 +599,12 @@ impl Renderer {
         }
     }
 
-    fn render(&mut self, dissection: Option<(&mut Dissection, &Easel)>) -> Result<()> {
+    /// Records a frame, and its display if it is wanted.
+    fn record<'a>(
+        &'a mut self,
+        dissection: Option<(&'a mut Dissection, &'a Easel)>,
+        display: bool,
+    ) -> Result<Recorder<'a>> {
         self.gpu.check()?;
         if let Some(problems) = self.gpu.reload_shaders() {
             self.shader_problems = problems;
@@ -575,14 +619,13 @@ impl Renderer {
         self.gpu.queue.write_buffer(&self.frame_uniform, 0, bytemuck::bytes_of(&self.frame()));
         self.film.prepare(&self.gpu, &self.film_params, self.shown.of_film(self.technique.info().views), self.scale());
 
-        let restart = self.restart_film || !self.accumulate;
+        let restart = self.restarts_film();
         let counts = self.view().counts;
         let parity = (self.frame_index & 1) as usize;
         if let Some(timer) = &mut self.display_timer {
             timer.clear();
         }
         let mut recorder = Recorder::new(&self.gpu, self.timer.as_mut());
-        let dissects = dissection.is_some();
         if let Some((dissection, easel)) = dissection {
             recorder.dissect(dissection, easel);
         }
@@ -615,15 +658,23 @@ impl Renderer {
                 .dispatch_over(size)?;
         }
         self.film.record_accumulate(&mut recorder, restart)?;
-        if dissects {
+        if display {
             self.film.record_display(&mut recorder, &self.film_params)?;
         }
-        recorder.submit();
+        Ok(recorder)
+    }
 
+    /// Whether the frame that is recorded is the film's first.
+    fn restarts_film(&self) -> bool {
+        self.restart_film || !self.accumulate
+    }
+
+    /// Counts a frame that has been submitted.
+    fn note_frame(&mut self) -> Result<()> {
         if let Some(inspector) = &mut self.inspector {
             inspector.set_observed();
         }
-        self.accumulated = if restart { 1 } else { self.accumulated + 1 };
+        self.accumulated = if self.restarts_film() { 1 } else { self.accumulated + 1 };
         self.restart_film = false;
         self.previous_camera = Some(self.camera.clone());
         // Views of the surface run no technique, and leave its history as old as it was.

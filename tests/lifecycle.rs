@@ -501,6 +501,31 @@ fn biases_are_those_of_the_settings_as_they_are() {
     }
 }
 
+/// A frame that is begun, whose pipelines are made one by one, and that is finished, is the same as one at once; and the pipelines are as many
+/// as was said.
+#[test]
+fn a_frame_in_parts_is_the_same_frame() {
+    let mut whole = renderer(&gpu(), support::builtin("cornell"), SIZE, "restir-di", &[]);
+    let expected = render(&mut whole, 3);
+    let gpu = fresh_gpu();
+    let mut parts = renderer(&gpu, support::builtin("cornell"), SIZE, "restir-di", &[]);
+    let mut unmade = Vec::new();
+    for _ in 0..3 {
+        let count = parts.begin_frame().expect("a frame");
+        for _ in 0..count {
+            pollster::block_on(parts.make_pipeline());
+        }
+        parts.finish_frame().expect("a frame");
+        unmade.push(count);
+    }
+    // Primary rays, candidates, spatial reuse, indirect light, shading, film, display; then temporal reuse; then none.
+    assert_eq!(unmade, [7, 1, 0]);
+    assert_eq!(parts.accumulated_frames(), 3);
+    assert_same(&pollster::block_on(parts.read_image()).expect("a picture"), &expected, "in parts");
+    let times = pollster::block_on(parts.pass_times()).expect("times");
+    assert_eq!(times.last().map(|time| time.name), Some("film/display"));
+}
+
 /// What a renderer says it holds on the device is what the allocator of the device has given it: how it grows with the picture, and that
 /// nothing stays of another technique or size.
 #[test]

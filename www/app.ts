@@ -129,7 +129,7 @@ class App {
   /** Shows what the viewer tells. */
   private follow(): void {
     const { view } = this;
-    view.addEventListener('progress', ({ detail }) => showProgress(detail.stage, detail.fraction, detail.what));
+    view.addEventListener('progress', ({ detail }) => showProgress(detail.stage, detail.fraction, detail.what, detail.count));
     view.addEventListener('load', ({ detail }) => this.showScene(detail));
     view.addEventListener('sample', ({ detail }) => this.showSample(detail));
     view.addEventListener('error', ({ detail }) => this.showFailure(detail));
@@ -170,8 +170,6 @@ class App {
   private showScene(scene: Scene): void {
     const { report, contents } = scene;
     clearError();
-    // Its first frame ends it.
-    showProgress('picture', 1, 'Rendering the first picture');
     this.showWarnings(report);
     // Settings of the address that were not taken are gone; later scenes leave the panel as it is.
     if (!this.hadScene) this.showMenus();

@@ -137,9 +137,11 @@ export class RestirViewerElement extends HTMLElement {
       this.progress.hidden = false;
       this.progress.value = detail.fraction;
     });
-    viewer.addEventListener('sample', () => (this.poster.hidden = this.hasPicture = true));
-    // What the load has just complained of stays.
-    viewer.addEventListener('load', () => (this.progress.hidden = true));
+    viewer.addEventListener('sample', () => {
+      this.poster.hidden = this.hasPicture = true;
+      // A frame of the former scene ends no load. What the load has just complained of stays.
+      if (!viewer.opening) this.progress.hidden = true;
+    });
     viewer.addEventListener('restored', () => this.clear());
     viewer.addEventListener('error', ({ detail }) => this.showFailure(detail));
     for (const type of passedOn) {

@@ -36,13 +36,13 @@ export function clearError(): void {
   message.hidden = true;
 }
 
-/** Shows a load's stage, how far it is (0 to 1) and what it does. At 1 it cannot be cancelled any more. */
-export function showProgress(stage: Stage, fraction: number, what: string): void {
+/** Shows a load's stage, how many of how many things of it are done, how far the load is (0 to 1) and what it does. At 1 it cannot be cancelled any more. */
+export function showProgress(stage: Stage, fraction: number, what: string, count?: [done: number, all: number]): void {
   byId('cancel', HTMLButtonElement).disabled = fraction === 1;
   byId('loading', HTMLElement).hidden = false;
   byId('loading-bar', HTMLProgressElement).value = fraction;
   byId('loading-text', HTMLElement).textContent = what;
-  showStages(byId('stages', HTMLOListElement), stage);
+  showStages(byId('stages', HTMLOListElement), stage, count);
 }
 
 /** The load has ended. */

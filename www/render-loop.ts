@@ -6,11 +6,38 @@ interface Work {
   refuse(reason: unknown): void;
 }
 
+/** Milliseconds after which other work of the page comes first. */
+const slice = 8;
+
+/**
+ * Renders a frame and presents it, and waits for the device. Pipelines that it waits for are asked for one by one, and the page draws and
+ * listens meanwhile; `making` is told how many of how many the device has compiled, also where there are none.
+ */
+async function renderFrame(viewer: Viewer, making: (made: number, all: number) => void): Promise<void> {
+  let began = performance.now();
+  const all = viewer.begin();
+  making(0, all);
+  let made = 0;
+  const compiled: Promise<void>[] = [];
+  for (let asked = 0; asked < all; asked++) {
+    if (performance.now() - began >= slice) {
+      await new Promise((resolve) => setTimeout(resolve));
+      began = performance.now();
+    }
+    // Not waited for here: the device shall never wait for the page.
+    compiled.push((viewer.make_pipeline() as Promise<void>).then(() => making(++made, all)));
+  }
+  viewer.finish();
+  await Promise.all([...compiled, viewer.idle()]);
+}
+
 const nextAnimationFrame = () => new Promise<number>((resolve) => requestAnimationFrame(resolve));
 
 export interface LoopEvents {
   /** Before each frame, with the seconds since the last call. Returns whether the picture must change. */
   beforeFrame(viewer: Viewer, seconds: number): boolean;
+  /** While a frame waits for its pipelines: so many of all it needs are compiled. Once with 0 and 0 where it does not wait. */
+  making(made: number, all: number): void;
   /** After each frame, with the milliseconds from its first command to an idle device. */
   afterFrame(viewer: Viewer, milliseconds: number): void;
   /** A frame failed. The loop has let go of the viewer. */
@@ -115,8 +142,7 @@ export class RenderLoop {
       this.changed = false;
       this.frames += 1;
       const start = performance.now();
-      viewer.render();
-      await viewer.idle();
+      await renderFrame(viewer, this.events.making);
       this.events.afterFrame(viewer, performance.now() - start);
     } catch (error) {
       this.viewer = undefined;

@@ -2,7 +2,7 @@
 
 export const stages = ['download', 'parse', 'bvh', 'textures', 'pipelines', 'picture'] as const;
 
-/** Pipelines are the renderer's start; the last stage ends with the first frame. */
+/** Pipelines are made while the renderer starts; the last stage ends with the first frame. */
 export type Stage = (typeof stages)[number];
 
 const titles: Record<Stage, string> = {
@@ -14,25 +14,22 @@ const titles: Record<Stage, string> = {
   picture: 'First picture',
 };
 
-/** The stage that the module means by its words. */
-export function stageOf(what: string): Stage {
-  if (/BVH|meshes/.test(what)) return 'bvh';
-  return /mip|lights|done/.test(what) ? 'textures' : 'parse';
-}
-
 /** So many bytes as a person reads them. */
 export function sizeText(bytes: number): string {
   return bytes < 1e6 ? `${Math.ceil(bytes / 1e3)} KB` : `${(bytes / 1e6).toFixed(1)} MB`;
 }
 
-/** Lists all stages, with the current one marked. */
-export function showStages(list: HTMLOListElement, current: Stage): void {
+/** Lists all stages, with the current one marked, and how many of how many things of it are done. */
+export function showStages(list: HTMLOListElement, current: Stage, count?: [done: number, all: number]): void {
   const now = stages.indexOf(current);
   const items = stages.map((stage, at) => {
     const item = document.createElement('li');
     item.textContent = titles[stage];
     if (at < now) item.className = 'done';
-    if (at === now) item.setAttribute('aria-current', 'step');
+    if (at === now) {
+      item.setAttribute('aria-current', 'step');
+      if (count) item.append(` ${count.join(' of ')}`);
+    }
     return item;
   });
   list.replaceChildren(...items);

@@ -62,9 +62,13 @@ export interface Change {
 }
 
 export interface ViewerEventMap {
-  /** Which stage a load is in, how far it is as a whole, from 0 to 1, and what it does; at 1 the renderer takes it over, and it cannot be cancelled any more. */
-  progress: CustomEvent<{ stage: Stage; fraction: number; what: string }>;
-  /** A scene is shown. */
+  /**
+   * Which stage a load is in, how far it is as a whole, from 0 to 1, and what it does; at 1 the renderer takes it over, and it cannot be
+   * cancelled any more. `count` tells how many of how many pipelines are compiled. The last stages, `pipelines` and `picture`, end with the
+   * first `sample` after `load`.
+   */
+  progress: CustomEvent<{ stage: Stage; fraction: number; what: string; count?: [done: number, all: number] }>;
+  /** A scene is there; its first picture is about to be rendered. */
   load: CustomEvent<Scene>;
   /** After each frame. */
   sample: CustomEvent<Sample>;
@@ -135,6 +139,7 @@ export class RestirViewer extends EventTarget {
   private readonly fade: Fade;
   private readonly loop = new RenderLoop({
     beforeFrame: (viewer, seconds) => this.beforeFrame(viewer, seconds),
+    making: (made, all) => this.making(made, all),
     afterFrame: (viewer, milliseconds) => this.afterFrame(viewer, milliseconds),
     failed: (error) => this.failed(error),
   });
@@ -156,6 +161,8 @@ export class RestirViewer extends EventTarget {
   private halted = false;
   private kept: Picture | undefined;
   private inspected: [number, number] | undefined;
+  /** Whether what was loaded waits for its first picture. */
+  private fresh = false;
   private ended = false;
 
   /** `settings` are those of the first scene; what it does not take is reported and dropped. `scene` is ignored: see `load`. */
@@ -798,13 +805,14 @@ export class RestirViewer extends EventTarget {
     loading.catch(() => undefined);
     await this.start();
     const { flat, contents = noContents } = await loading;
-    progress('pipelines', 1, 'Starting the renderer');
+    progress('pipelines', 1, 'Uploading the scene');
     await this.present(flat, { source, surroundings, contents }, view);
   }
 
   private async present(flat: Uint8Array, given: Pick<Scene, 'source' | 'surroundings' | 'contents'>, view: View | undefined): Promise<void> {
     const { source, surroundings } = given;
     const take = (viewer: Viewer): void => {
+      this.fresh = true;
       this.shown = { ...given, cameras: camerasOf(viewer), report: reportOf(viewer) };
       this.flat = flat;
       this.resolution.forget();
@@ -1000,6 +1008,14 @@ export class RestirViewer extends EventTarget {
       if (!this.accumulating) viewer.set_time(this.moment);
     }
     return moved || resized;
+  }
+
+  /** Tells of the pipelines that the first picture waits for. */
+  private making(made: number, all: number): void {
+    if (!this.fresh) return;
+    this.fresh = made < all;
+    if (this.fresh) this.emit('progress', { stage: 'pipelines', fraction: 1, what: 'Making pipelines', count: [made, all] });
+    else this.emit('progress', { stage: 'picture', fraction: 1, what: 'Rendering the first picture' });
   }
 
   /** Keeps the picture above the canvas where a sharper one is about to be rendered. */

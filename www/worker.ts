@@ -4,7 +4,7 @@ import type { Progress } from './loader.js';
 import init, { flatten_builtin } from './pkg/restir.js';
 import { toFailure } from './messages.js';
 import type { Contents, LoadRequest, LoadResponse, Loaded, SceneSource, Surroundings } from './protocol.js';
-import { sizeText, stageOf } from './stages.js';
+import { type Stage, sizeText } from './stages.js';
 
 const reply = (response: LoadResponse, transfer: Transferable[] = []) => self.postMessage(response, { transfer });
 
@@ -14,7 +14,7 @@ const progress: Progress = (stage, fraction, what) => reply({ kind: 'progress', 
 let downloaded = 0;
 
 /** What the modules tell while they read and build. */
-const building = (fraction: number, what: string) => progress(stageOf(what), downloaded + (1 - downloaded) * fraction, what);
+const building = (stage: Stage, fraction: number, what: string) => progress(stage, downloaded + (1 - downloaded) * fraction, what);
 
 /** Milliseconds between two reports of a download. */
 const interval = 50;

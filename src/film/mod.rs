@@ -144,10 +144,10 @@ impl Film {
     /// Clears what is counted by the frame; with `restart`, also what is counted since the film began.
     pub fn clear_counters(&self, recorder: &mut Recorder<'_>, restart: bool) {
         if restart {
-            recorder.encoder.clear_buffer(&self.counters, 0, None);
+            recorder.clear(&self.counters, 0, None);
         } else {
-            recorder.encoder.clear_buffer(&self.counters, 0, Some(std::mem::offset_of!(Counters, nan) as u64));
-            recorder.encoder.clear_buffer(&self.counters, PIXEL_COUNTS, None);
+            recorder.clear(&self.counters, 0, Some(std::mem::offset_of!(Counters, nan) as u64));
+            recorder.clear(&self.counters, PIXEL_COUNTS, None);
         }
     }
 
@@ -191,7 +191,7 @@ impl Film {
     /// `SHADER` if a pass is bound wrongly.
     pub fn record_accumulate(&self, recorder: &mut Recorder<'_>, restart: bool) -> Result<()> {
         if restart {
-            recorder.encoder.clear_buffer(&self.accumulation, 0, None);
+            recorder.clear(&self.accumulation, 0, None);
         }
         recorder
             .pass(&table::FILM_ACCUMULATE)

@@ -55,7 +55,7 @@ impl Dissection {
                 }
                 (Resource::Buffer(display), BindingKind::StorageReadWrite) if binding.name == "display" => {
                     let picture = self.picture(recorder.gpu())?;
-                    recorder.encoder.copy_buffer_to_buffer(display, 0, &picture, 0, picture.size());
+                    recorder.copy(display, &picture, picture.size());
                     self.set(picture);
                 }
                 _ => {}

@@ -19,7 +19,7 @@ pub mod specialize;
 
 use crate::error::{Error, Result};
 use crate::pace::{Pace, SLICE_BYTES};
-use shader::{Pipeline, SceneFeatures, Shader};
+use shader::{SceneFeatures, Shader};
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
@@ -51,7 +51,9 @@ pub struct Gpu {
     albedo_table: wgpu::TextureView,
     adapter: wgpu::AdapterInfo,
     failure: Arc<Mutex<Option<String>>>,
-    pipelines: Arc<Mutex<HashMap<PipelineKey, Pipeline>>>,
+    pipelines: Arc<Mutex<HashMap<PipelineKey, wgpu::ComputePipeline>>>,
+    /// Of the bind groups of passes, by id.
+    layouts: Arc<Mutex<HashMap<&'static str, Vec<wgpu::BindGroupLayout>>>>,
     /// Text of every shader that has a planted fault, by id.
     #[cfg(not(target_arch = "wasm32"))]
     planted: Arc<Mutex<HashMap<&'static str, String>>>,
@@ -135,6 +137,7 @@ impl Gpu {
             adapter: adapter.get_info(),
             failure,
             pipelines: Arc::default(),
+            layouts: Arc::default(),
             #[cfg(not(target_arch = "wasm32"))]
             planted: Arc::default(),
             #[cfg(all(debug_assertions, not(target_arch = "wasm32")))]
@@ -165,12 +168,33 @@ impl Gpu {
     }
 
     /// The compute pipeline of a pass for scenes that have `features`, made on first use.
-    pub fn pipeline(&self, shader: &'static Shader, features: SceneFeatures) -> Pipeline {
+    pub fn pipeline(&self, shader: &'static Shader, features: SceneFeatures) -> wgpu::ComputePipeline {
         let key = pipeline_key(shader, features);
-        let make = || shader.compute_pipeline(&self.device, &self.shader_source(shader), key.1);
+        let make = || {
+            let layouts = self.layouts(shader);
+            shader.compute_pipeline(&self.device, &layouts, &self.shader_source(shader), key.1)
+        };
         match self.pipelines.lock() {
             Ok(mut pipelines) => pipelines.entry(key).or_insert_with(make).clone(),
             Err(_) => make(),
+        }
+    }
+
+    /// The layouts of a compute pass's bind groups, by group index; the same for all its pipelines.
+    pub fn layouts(&self, shader: &'static Shader) -> Vec<wgpu::BindGroupLayout> {
+        let make = || shader.layouts(&self.device, wgpu::ShaderStages::COMPUTE);
+        match self.layouts.lock() {
+            Ok(mut layouts) => layouts.entry(shader.id).or_insert_with(make).clone(),
+            Err(_) => make(),
+        }
+    }
+
+    /// Resolves when the device has taken in all that it was given so far: when pipelines are compiled, whether or not passes have run.
+    pub fn taken_in(&self) -> impl Future<Output = ()> + use<> {
+        // A scope round nothing catches nothing, and is answered in turn.
+        let scope = self.device.push_error_scope(wgpu::ErrorFilter::Internal).pop();
+        async move {
+            scope.await;
         }
     }
 

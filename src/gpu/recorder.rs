@@ -1,10 +1,12 @@
-//! Recording a frame: a straight line of passes, each a compute pass of its own with a label and timestamps.
+//! Recording a frame: a straight line of passes, each a compute pass of its own with a label and timestamps. What is recorded
+//! is run afterwards, for then it is known which pipelines have to be made, and between two of them the page can draw.
 
-use super::Gpu;
 use super::dissection::{Dissection, Easel};
 use super::shader::{Resource, SceneFeatures, Shader};
+use super::{Gpu, pipeline_key};
 use crate::error::Result;
 use glam::UVec2;
+use std::collections::VecDeque;
 
 /// Most passes that can be timed in one frame; later ones run untimed.
 pub const MAXIMUM_TIMED_PASSES: u32 = 64;
@@ -75,11 +77,108 @@ impl Timer {
     }
 }
 
+/// One step of a recorded frame.
+#[derive(Debug)]
+enum Command {
+    /// A compute pass; its times become those of this index.
+    Pass {
+        shader: &'static Shader,
+        features: SceneFeatures,
+        groups: Vec<wgpu::BindGroup>,
+        workgroups: [u32; 3],
+        timed: Option<u32>,
+    },
+    /// Zeroes so many bytes from an offset on, all without a number.
+    Clear { buffer: wgpu::Buffer, offset: u64, size: Option<u64> },
+    /// Copies the first bytes of a buffer.
+    Copy { from: wgpu::Buffer, to: wgpu::Buffer, size: u64 },
+}
+
+/// A frame that is recorded and not yet run to its end. It borrows nothing.
+#[derive(Debug)]
+pub struct Recording {
+    commands: VecDeque<Command>,
+    encoder: wgpu::CommandEncoder,
+    timer: Option<Timer>,
+}
+
+impl Recording {
+    /// Pipelines that are not made yet.
+    pub fn unmade(&self, gpu: &Gpu) -> usize {
+        let mut unmade = Vec::new();
+        for command in &self.commands {
+            if let &Command::Pass { shader, features, .. } = command
+                && !gpu.has_pipeline(shader, features)
+                && !unmade.contains(&pipeline_key(shader, features))
+            {
+                unmade.push(pipeline_key(shader, features));
+            }
+        }
+        unmade.len()
+    }
+
+    /// Runs what comes before the next pipeline that is not made, and makes that; false where there is none and all has been recorded.
+    /// Compiling may take a second: the device runs the passes before meanwhile.
+    pub fn make_pipeline(&mut self, gpu: &Gpu) -> bool {
+        while let Some(command) = self.commands.pop_front() {
+            if let &Command::Pass { shader, features, .. } = &command
+                && !gpu.has_pipeline(shader, features)
+            {
+                self.flush(gpu);
+                gpu.pipeline(shader, features);
+                self.commands.push_front(command);
+                return true;
+            }
+            self.encode(gpu, command);
+        }
+        false
+    }
+
+    fn encode(&mut self, gpu: &Gpu, command: Command) {
+        match command {
+            Command::Pass { shader, features, groups, workgroups: [x, y, z], timed } => {
+                let pipeline = gpu.pipeline(shader, features);
+                let timestamp_writes =
+                    timed.zip(self.timer.as_ref()).map(|(index, timer)| wgpu::ComputePassTimestampWrites {
+                        query_set: &timer.queries,
+                        beginning_of_pass_write_index: Some(2 * index),
+                        end_of_pass_write_index: Some(2 * index + 1),
+                    });
+                let descriptor = wgpu::ComputePassDescriptor { label: Some(shader.id), timestamp_writes };
+                let mut pass = self.encoder.begin_compute_pass(&descriptor);
+                pass.set_pipeline(&pipeline);
+                for (index, group) in groups.iter().enumerate() {
+                    pass.set_bind_group(index as u32, group, &[]);
+                }
+                pass.dispatch_workgroups(x, y, z);
+            }
+            Command::Clear { buffer, offset, size } => self.encoder.clear_buffer(&buffer, offset, size),
+            Command::Copy { from, to, size } => self.encoder.copy_buffer_to_buffer(&from, 0, &to, 0, size),
+        }
+    }
+
+    /// Submits what is encoded so far; the device runs it while this thread goes on.
+    fn flush(&mut self, gpu: &Gpu) {
+        let encoded = std::mem::replace(&mut self.encoder, frame_encoder(gpu));
+        gpu.queue.submit([encoded.finish()]);
+    }
+
+    /// Runs all that is left.
+    pub fn submit(mut self, gpu: &Gpu) {
+        while self.make_pipeline(gpu) {}
+        if let Some(timer) = &self.timer
+            && !timer.names.is_empty()
+        {
+            self.encoder.resolve_query_set(&timer.queries, 0..2 * timer.names.len() as u32, &timer.resolved, 0);
+        }
+        gpu.queue.submit([self.encoder.finish()]);
+    }
+}
+
 /// Records passes. Resources shared by many passes are bound once, by name.
 pub struct Recorder<'a> {
     gpu: &'a Gpu,
-    /// The encoder, for copies and clears.
-    pub encoder: wgpu::CommandEncoder,
+    commands: VecDeque<Command>,
     timer: Option<&'a mut Timer>,
     shared: Vec<(&'a str, Resource<'a>)>,
     /// What the scene of this frame has.
@@ -101,7 +200,7 @@ impl<'a> Recorder<'a> {
         let shared = vec![("albedo_table", Resource::Texture(&gpu.albedo_table))];
         Recorder {
             gpu,
-            encoder: frame_encoder(gpu),
+            commands: VecDeque::new(),
             timer,
             shared,
             features: SceneFeatures::ALL,
@@ -114,6 +213,16 @@ impl<'a> Recorder<'a> {
     /// Binds a resource for every later pass that asks for it by name.
     pub fn share(&mut self, name: &'a str, resource: impl Into<Resource<'a>>) {
         self.shared.push((name, resource.into()));
+    }
+
+    /// Zeroes `size` bytes of a buffer from `offset` on; without a size all that follow.
+    pub fn clear(&mut self, buffer: &wgpu::Buffer, offset: u64, size: Option<u64>) {
+        self.commands.push_back(Command::Clear { buffer: buffer.clone(), offset, size });
+    }
+
+    /// Copies the first `size` bytes of a buffer to the beginning of another.
+    pub fn copy(&mut self, from: &wgpu::Buffer, to: &wgpu::Buffer, size: u64) {
+        self.commands.push_back(Command::Copy { from: from.clone(), to: to.clone(), size });
     }
 
     /// Keeps in `dissection` what the passes from now on write.
@@ -151,49 +260,29 @@ impl<'a> Recorder<'a> {
     }
 
     fn run(&mut self, shader: &'static Shader, bound: &[(&str, Resource<'_>)], workgroups: [u32; 3]) -> Result<()> {
-        // Compiling may take a second: in a first frame the passes before run meanwhile.
-        if !self.gpu.has_pipeline(shader, self.features) {
-            self.flush();
-        }
-        let pipeline = self.gpu.pipeline(shader, self.features);
-        let groups = shader.bind_groups(self.gpu, &pipeline.groups, bound)?;
+        let groups = shader.bind_groups(self.gpu, &self.gpu.layouts(shader), bound)?;
         let timer = self.timer.as_mut().filter(|_| !self.aside);
-        let timestamp_writes = timer.and_then(|timer| {
+        let timed = timer.and_then(|timer| {
             let index = timer.names.len() as u32;
             (index < MAXIMUM_TIMED_PASSES).then(|| {
                 timer.names.push(shader.id);
-                wgpu::ComputePassTimestampWrites {
-                    query_set: &timer.queries,
-                    beginning_of_pass_write_index: Some(2 * index),
-                    end_of_pass_write_index: Some(2 * index + 1),
-                }
+                index
             })
         });
-        let mut pass =
-            self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(shader.id), timestamp_writes });
-        pass.set_pipeline(&pipeline.pipeline);
-        for (index, group) in groups.iter().enumerate() {
-            pass.set_bind_group(index as u32, group, &[]);
-        }
-        let [x, y, z] = workgroups;
-        pass.dispatch_workgroups(x, y, z);
+        self.commands.push_back(Command::Pass { shader, features: self.features, groups, workgroups, timed });
         Ok(())
     }
 
-    /// Submits what is recorded so far; the device runs it while this thread goes on.
-    fn flush(&mut self) {
-        let recorded = std::mem::replace(&mut self.encoder, frame_encoder(self.gpu));
-        self.gpu.queue.submit([recorded.finish()]);
+    /// Ends the frame: what was recorded, to be run.
+    pub fn finish(self) -> Recording {
+        let Recorder { gpu, commands, timer, .. } = self;
+        Recording { commands, encoder: frame_encoder(gpu), timer: timer.map(|timer| timer.clone()) }
     }
 
-    /// Ends the frame and submits it.
-    pub fn submit(mut self) {
-        if let Some(timer) = self.timer
-            && !timer.names.is_empty()
-        {
-            self.encoder.resolve_query_set(&timer.queries, 0..2 * timer.names.len() as u32, &timer.resolved, 0);
-        }
-        self.gpu.queue.submit([self.encoder.finish()]);
+    /// Ends the frame and runs it.
+    pub fn submit(self) {
+        let gpu = self.gpu;
+        self.finish().submit(gpu);
     }
 }
 

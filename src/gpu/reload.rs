@@ -1,7 +1,7 @@
 //! Reloading shaders from disk while the program runs (native debug builds).
 
 use super::PipelineKey;
-use super::shader::{Pipeline, Shader, table};
+use super::shader::{Shader, table};
 use super::shader_source::flatten;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ impl Reloader {
 
     /// Takes up every shader whose text changed and drops its pipelines, so that the next use makes them anew. No file
     /// changed: `None`. Else one line for each shader that does not compile; it keeps its old text and pipelines.
-    pub fn reload(&mut self, pipelines: &mut HashMap<PipelineKey, Pipeline>) -> Option<Vec<String>> {
+    pub fn reload(&mut self, pipelines: &mut HashMap<PipelineKey, wgpu::ComputePipeline>) -> Option<Vec<String>> {
         let newest = newest(&self.folder).filter(|t| *t > self.seen)?;
         self.seen = newest;
         let mut problems = Vec::new();

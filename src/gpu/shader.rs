@@ -180,15 +180,6 @@ scene_features! {
     }
 }
 
-/// A pipeline and the layouts its bind groups are made with.
-#[derive(Debug, Clone)]
-pub struct Pipeline {
-    /// The compute pipeline.
-    pub pipeline: wgpu::ComputePipeline,
-    /// By group index.
-    pub groups: Vec<wgpu::BindGroupLayout>,
-}
-
 impl Shader {
     /// The highest group index plus one.
     pub fn group_count(&self) -> u32 {
@@ -225,27 +216,31 @@ impl Shader {
     }
 
     /// The compute pipeline of this pass from `source` (its own, or an edited one with the same bindings), for scenes
-    /// that have `features`.
-    pub fn compute_pipeline(&self, device: &wgpu::Device, source: &str, features: SceneFeatures) -> Pipeline {
+    /// that have `features`, with its own [`layouts`](Self::layouts).
+    pub fn compute_pipeline(
+        &self,
+        device: &wgpu::Device,
+        groups: &[wgpu::BindGroupLayout],
+        source: &str,
+        features: SceneFeatures,
+    ) -> wgpu::ComputePipeline {
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(self.id),
             source: wgpu::ShaderSource::Wgsl(self.specialized(source, features).into()),
         });
-        let groups = self.layouts(device, wgpu::ShaderStages::COMPUTE);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(self.id),
             bind_group_layouts: &groups.iter().map(Some).collect::<Vec<_>>(),
             immediate_size: 0,
         });
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(self.id),
             layout: Some(&layout),
             module: &module,
             entry_point: Some("main"),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             cache: None,
-        });
-        Pipeline { pipeline, groups }
+        })
     }
 
     /// Whether an edited text of this pass is valid and binds what the built one does, for that is what the program knows

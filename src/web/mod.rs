@@ -6,6 +6,7 @@ mod measure;
 #[cfg(feature = "viewer")]
 mod viewer;
 
+use crate::scene::flat::Step;
 use crate::{Error, FlatScene, Scene};
 use wasm_bindgen::prelude::*;
 
@@ -64,14 +65,15 @@ pub fn surround_by_name(scene: &mut Scene, name: &str) -> crate::Result<()> {
     }
 }
 
-/// A scene as `FlatScene` bytes; `progress(fraction, what)` is called meanwhile.
+/// A scene as `FlatScene` bytes; `progress(stage, fraction, what)` is called meanwhile.
 ///
 /// # Errors
 /// Those of [`FlatScene::build`].
 pub fn flatten(mut scene: Scene, lighting: &Lighting, progress: &js_sys::Function) -> JsResult<Vec<u8>> {
     scene.ensure_light(lighting.lights(), lighting.seed().into());
-    let mut report = |fraction: f32, what: &str| {
-        let _ = progress.call2(&JsValue::NULL, &fraction.into(), &what.into());
+    let mut report = |fraction: f32, step: Step| {
+        let what = step.to_string();
+        let _ = progress.call3(&JsValue::NULL, &step.stage().into(), &fraction.into(), &what.into());
     };
     Ok(FlatScene::build(&scene, &mut report).js()?.to_bytes())
 }

@@ -243,6 +243,27 @@ impl Viewer {
         self.present()
     }
 
+    /// Begins a frame that [`Viewer::finish`] ends and presents. Returns the number of pipelines that it waits for, each made by a call of
+    /// [`Viewer::make_pipeline`]. Nothing else may be asked of the viewer meanwhile.
+    pub fn begin(&mut self) -> JsResult<usize> {
+        self.renderer.begin_frame().js()
+    }
+
+    /// Makes the next of these pipelines. Resolves when the device has compiled it.
+    pub fn make_pipeline(&mut self) -> js_sys::Promise {
+        let made = self.renderer.make_pipeline();
+        wasm_bindgen_futures::future_to_promise(async move {
+            made.await;
+            Ok(JsValue::UNDEFINED)
+        })
+    }
+
+    /// Ends the frame that was begun, and presents it.
+    pub fn finish(&mut self) -> JsResult<()> {
+        self.renderer.finish_frame().js()?;
+        self.blit.present(self.renderer.gpu(), self.renderer.film()).js()
+    }
+
     /// Presents the film as it is, without a new frame.
     pub fn present(&mut self) -> JsResult<()> {
         self.renderer.render_display().js()?;

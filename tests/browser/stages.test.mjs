@@ -1,4 +1,4 @@
-// A load is told stage by stage, its download byte by byte, until the first picture.
+// A load is told stage by stage, its download byte by byte, its pipelines one by one, until the first picture.
 import { strict as assert } from 'node:assert';
 import { createServer } from 'node:http';
 import { after, before, test } from 'node:test';
@@ -16,8 +16,10 @@ const watch = () => {
   document.addEventListener('DOMContentLoaded', () => {
     const loading = document.getElementById('loading');
     const look = () => {
+      const [, current, count] = /^(.*?)(?: (\d+ of \d+))?$/.exec([...loading.querySelectorAll('[aria-current=step]')].map((item) => item.textContent).join());
       const state = {
-        current: [...loading.querySelectorAll('[aria-current=step]')].map((item) => item.textContent).join(),
+        current,
+        count,
         done: loading.querySelectorAll('.done').length,
         text: document.getElementById('loading-text').textContent,
         value: document.getElementById('loading-bar').value,
@@ -34,6 +36,17 @@ const watch = () => {
 const seen = (page) => page.evaluate(() => window.seen);
 const without = (list) => list.filter((text, at) => text !== '' && text !== list[at - 1]);
 
+/** Pipelines are counted from 0 up to those there are, in their stage; returns the counts. */
+function assertCounts(states, all) {
+  assert.ok(states.every(({ count, current }) => !count || current === 'Pipelines'));
+  const counts = without(states.map(({ count = '' }) => count)).map((text) => text.split(' of ').map(Number));
+  assert.ok(counts.every(([, of]) => of === all), counts.join('; '));
+  const made = counts.map(([each]) => each);
+  assert.deepEqual(made, [...new Set(made)].sort((a, b) => a - b));
+  assert.ok(made[0] === 0 && made.at(-1) < all, made.join());
+  return made;
+}
+
 test('a built-in scene goes through its stages in order; the last ends with the first picture', async () => {
   const { page, problems } = await openPage(site, '?scene=cornell&technique=normals&size=24x16&frames=1', watch);
   try {
@@ -42,6 +55,8 @@ test('a built-in scene goes through its stages in order; the last ends with the 
     const states = await seen(page);
     assert.deepEqual(without(states.map(({ current }) => current)), all);
     for (const { current, done } of states) if (current) assert.equal(done, all.indexOf(current));
+    // Primary rays, normals, film, display. Several may be compiled at a time; the last of them begins the next stage.
+    assertCounts(states, 4);
     const picture = states.filter(({ current, hidden }) => current === 'First picture' && !hidden);
     assert.ok(picture.length > 0 && picture.every(({ pictures }) => pictures === 0), 'before the first picture the bar is there');
     assert.ok(states.at(-1).hidden && states.at(-1).pictures >= 1, 'and not after it');
@@ -55,6 +70,17 @@ test('a built-in scene goes through its stages in order; the last ends with the 
   } finally {
     await page.close();
   }
+});
+
+test('pipelines are counted as the device compiles them', async (context) => {
+  const { page, problems } = await openPage(site, '?scene=cornell&technique=restir-di&size=24x16&frames=1', watch);
+  await waitForFrames(page, 1);
+  // Primary rays, candidates, spatial reuse, indirect light, shading, film, display.
+  const made = assertCounts(await seen(page), 7);
+  context.diagnostic(`told at ${made.join(', ')} of 7`);
+  assert.ok(made.length > 1);
+  assertNoProblems(problems);
+  await page.close();
 });
 
 /** Serves a triangle whose buffer comes in pieces, slowly. */

@@ -62,10 +62,7 @@ const techniques = ['path-tracer', 'ris', 'restir-di-decoupled', 'normals', 'res
 const scenes = ['veach-mis', 'motion', 'area-lights', 'cornell'];
 const chooseAll = (menu, values) => values.map((value) => [`${menu} ${value}`, (page) => page.select(`#${menu}`, value)]);
 
-/**
- * Not bound by the limit, only told: a technique or scene that is shown for the first time, for `Viewer.render` then translates shaders and
- * asks for pipelines in one call of the wasm module. Measured: 53 ms for restir-di-decoupled, 64 ms for motion, below 50 ms for the others.
- */
+/** What is shown for the first time: its shaders are translated and its pipelines asked for, one by one. */
 const firstTimes = [...chooseAll('technique', techniques), ...chooseAll('scene', scenes)];
 
 const repeated = [
@@ -91,12 +88,29 @@ test('no task of the main thread takes 50 ms', { skip: browserName !== 'chromium
   await page.evaluate(watchCalls);
   await settled(page);
 
-  const told = ({ longest, calls }) => `${Math.round(longest) || 'below 50'}${calls.length > 0 && longest > 0 ? ` (${calls.join(', ')})` : ''}`;
-  for (const [what, act] of firstTimes) {
-    await act(page, 0);
-    console.log(`${what} for the first time: ${told(await settled(page))} ms`);
-  }
   const late = [];
+  const told = ({ longest, calls }) => `${Math.round(longest) || 'below 50'}${calls.length > 0 && longest > 0 ? ` (${calls.join(', ')})` : ''}`;
+  // A page knows only one first time: another attempt is another page.
+  const seenFirst = new Map(firstTimes.map(([what]) => [what, []]));
+  const isLate = (seen) => !seen.some(({ longest }) => longest <= limit);
+  for (let attempt = 0; attempt < 3 && [...seenFirst.values()].some(isLate); attempt++) {
+    const fresh = attempt === 0 ? page : (await openPage(site, '?scene=cornell&size=64x40', watch)).page;
+    if (fresh !== page) {
+      await waitForFrames(fresh, 5);
+      await fresh.evaluate(watchCalls);
+      await settled(fresh);
+    }
+    for (const [what, act] of firstTimes) {
+      await act(fresh, 0);
+      seenFirst.get(what).push(await settled(fresh));
+    }
+    if (fresh !== page) await fresh.close();
+  }
+  for (const [what, seen] of seenFirst) {
+    const line = `${what} for the first time: ${seen.map(told).join('; ')} ms`;
+    console.log(line);
+    if (isLate(seen)) late.push(line);
+  }
   // Each technique and scene once more, from another one.
   const again = (steps) => steps.map(([what, act], at) => [what, act, steps.at(at - 1)[1]]);
   for (const [what, act, away] of [...repeated, ...again(firstTimes.slice(0, techniques.length)), ...again(firstTimes.slice(techniques.length))]) {

@@ -1,7 +1,7 @@
 //! The two levels: which meshes are merged, which keep a bottom level of their own, and where those stand.
 
 use super::triangles::{self, Soup};
-use super::{Deformer, Deformers, FlatInstance, FlatMesh};
+use super::{Deformer, Deformers, FlatInstance, FlatMesh, Step};
 use crate::error::{Error, Result};
 use crate::scene::bvh::{self, Bvh};
 use crate::scene::gpu_types::{BvhNode, NONE, Triangle, TriangleAttributes};
@@ -109,7 +109,7 @@ pub(crate) fn is_invertible(transform: Mat4) -> bool {
 }
 
 /// Builds the bottom levels and the top level over them.
-pub(super) fn build(scene: &Scene, progress: &mut dyn FnMut(f32, &str)) -> Result<Levels> {
+pub(super) fn build(scene: &Scene, progress: &mut dyn FnMut(f32, Step)) -> Result<Levels> {
     let counts =
         rig::Counts { instances: scene.instances.len(), lights: scene.lights.len(), cameras: scene.cameras.len() };
     scene.rig.check(counts).map_err(|(place, what)| Error::bad_value(place, what))?;
@@ -130,14 +130,14 @@ pub(super) fn build(scene: &Scene, progress: &mut dyn FnMut(f32, &str)) -> Resul
     };
     let count = groups.len();
     for (i, group) in groups.iter().enumerate() {
-        let mut report = |fraction: f32, what: &str| progress((i as f32 + fraction) / count as f32, what);
+        let mut report = |fraction: f32, step: Step| progress((i as f32 + fraction) / count as f32, step);
         let mut soup = Soup::default();
         if group.mesh == NONE {
             let parts = group.instances.len();
             for (k, &index) in group.instances.iter().enumerate() {
                 // Each report may cross a thread.
                 if k.is_multiple_of(parts.div_ceil(MAX_REPORTS)) {
-                    report(0.3 * k as f32 / parts as f32, "placing meshes");
+                    report(0.3 * k as f32 / parts as f32, Step::Placing);
                 }
                 if !scene.rig.powers.is_empty() {
                     levels.merged.push((soup.triangles.len() as u32, index));
@@ -150,7 +150,7 @@ pub(super) fn build(scene: &Scene, progress: &mut dyn FnMut(f32, &str)) -> Resul
         } else {
             soup.add(scene, &scene.meshes[group.mesh as usize], Mat4::IDENTITY);
         }
-        report(0.3, "building the BVH");
+        report(0.3, Step::Bvh);
         levels.add(scene, group, soup);
     }
     levels.follow(&pose);

@@ -12,12 +12,14 @@ pub(super) mod lights;
 mod materials;
 mod mips;
 mod packing;
+mod step;
 mod textures;
 mod triangles;
 mod validate;
 
 pub use deformers::{Deformer, Deformers};
 pub use environment::FlatEnvironment;
+pub use step::Step;
 pub(super) use triangles::face_normal;
 
 use super::gpu_types::{BvhNode, Light, Material, MaterialExtensions, NONE, Triangle, TriangleAttributes};
@@ -194,9 +196,9 @@ impl FlatScene {
     /// # Errors
     /// [`Error::BadValue`] for indices out of range and numbers that are not usable; [`Error::Limit`] for more of something
     /// than a device can hold.
-    pub fn build(scene: &Scene, progress: &mut dyn FnMut(f32, &str)) -> Result<Self> {
+    pub fn build(scene: &Scene, progress: &mut dyn FnMut(f32, Step)) -> Result<Self> {
         let mut warnings = scene.warnings.clone();
-        let geometry = levels::build(scene, &mut |fraction, what| progress(0.8 * fraction, what))?;
+        let geometry = levels::build(scene, &mut |fraction, step| progress(0.8 * fraction, step))?;
         let levels::Levels {
             nodes,
             mut triangles,
@@ -218,13 +220,13 @@ impl FlatScene {
         let mut ask = |texture, texels| images.ask(texture, texels).map(|_| textures::Place::default());
         materials::flatten(scene, &mut ask)?;
         extensions::flatten(scene, &mut ask)?;
-        let mut report = |fraction| progress(0.8 + 0.1 * fraction, "making mip levels");
+        let mut report = |fraction| progress(0.8 + 0.1 * fraction, Step::Mips);
         let (textures, places) = images.pack(&mut warnings, &mut report)?;
         let mut find = |texture, texels| images.ask(texture, texels).and_then(|image| places.get(image).copied());
         let materials = materials::flatten(scene, &mut find)?;
         let material_extensions = extensions::flatten(scene, &mut find)?;
 
-        progress(0.9, "weighing lights");
+        progress(0.9, Step::Lights);
         let environment = match &scene.environment {
             Some(environment) => FlatEnvironment::build(environment)?,
             None => None,
@@ -285,7 +287,7 @@ impl FlatScene {
             bvh_cost: bvh::cost(flat.nodes.get(flat.root() as usize..).unwrap_or_default()),
             gpu_bytes: flat.gpu_bytes(),
         };
-        progress(1.0, "done");
+        progress(1.0, Step::Done);
         Ok(flat)
     }
 
