@@ -803,7 +803,43 @@ impl Renderer {
     ///
     /// # Errors
     /// `DEVICE` if they cannot be read back.
-    pub async fn read_auxiliary(&self) -> Result<Auxiliary> {
+    pub fn read_auxiliary(&self) -> impl Future<Output = Result<Auxiliary>> + use<> {
+        let read = self.read_surfaces();
+        async move {
+            let bytes = read.await?;
+            let mut texels = bytes.chunks_exact(16).map(bytemuck::pod_read_unaligned::<[f32; 4]>);
+            let pixels = bytes.len() / 48;
+            let (mut albedo, mut depth) = (Vec::with_capacity(pixels), Vec::with_capacity(pixels));
+            for [r, g, b, distance] in texels.by_ref().take(pixels) {
+                albedo.push([r, g, b]);
+                depth.push(distance);
+            }
+            let normal = texels.by_ref().take(pixels).map(|[x, y, z, _]| [x, y, z]).collect();
+            Ok(Auxiliary { albedo, normal, depth, motion: texels.map(|[x, y, ..]| [x, y]).collect() })
+        }
+    }
+
+    /// What [`Renderer::read_auxiliary`] reads, as it lies on the device: four `f32` a pixel, first albedo and depth of all pixels, then
+    /// normals, then motion, each row-major from the top.
+    ///
+    /// # Errors
+    /// `DEVICE` if they cannot be read back.
+    pub fn read_surfaces(&self) -> impl Future<Output = Result<Vec<u8>>> + use<> {
+        let recorded = self.record_first_surfaces();
+        let gpu = self.gpu.clone();
+        let textures = [&self.albedo_depth, &self.normal, &self.motion].map(|view| view.texture().clone());
+        async move {
+            recorded?;
+            let mut bytes = Vec::new();
+            for texture in &textures {
+                bytes.extend(gpu.read_texture(texture, 16).await?);
+            }
+            Ok(bytes)
+        }
+    }
+
+    /// Has albedo, normal, depth and motion of the last frame's primary hits written.
+    fn record_first_surfaces(&self) -> Result<()> {
         let mut recorder = Recorder::new(&self.gpu, None);
         self.gpu_scene.share(&mut recorder);
         self.render_params.specialise(&mut recorder.features);
@@ -811,21 +847,7 @@ impl Renderer {
         recorder.share("visibility", &self.visibility[(self.frame_index.wrapping_sub(1) & 1) as usize]);
         record_auxiliary(&mut recorder, [&self.albedo_depth, &self.normal, &self.motion], self.size())?;
         recorder.submit();
-        let mut out = Auxiliary::default();
-        for texel in self.gpu.read_texture(self.albedo_depth.texture(), 16).await?.chunks_exact(16) {
-            let [r, g, b, depth]: [f32; 4] = bytemuck::pod_read_unaligned(texel);
-            out.albedo.push([r, g, b]);
-            out.depth.push(depth);
-        }
-        for texel in self.gpu.read_texture(self.normal.texture(), 16).await?.chunks_exact(16) {
-            let [x, y, z, _]: [f32; 4] = bytemuck::pod_read_unaligned(texel);
-            out.normal.push([x, y, z]);
-        }
-        for texel in self.gpu.read_texture(self.motion.texture(), 16).await?.chunks_exact(16) {
-            let [x, y, ..]: [f32; 4] = bytemuck::pod_read_unaligned(texel);
-            out.motion.push([x, y]);
-        }
-        Ok(out)
+        Ok(())
     }
 
     /// Rays of the last frame, and what was left out of the film.

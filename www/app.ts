@@ -366,7 +366,8 @@ class App {
       for (const each of this.viewers()) void each.reset();
     });
     byId('timing', HTMLDetailsElement).addEventListener('toggle', () => this.stats && showTiming(this.stats));
-    button('save').addEventListener('click', () => void this.save());
+    button('save').addEventListener('click', () => void this.save('png', 'png'));
+    button('save-exr').addEventListener('click', () => void this.save('image/x-exr', 'exr'));
     button('copy-link').addEventListener('click', () => void this.copy(button('copy-link'), this.link()));
     button('copy-command').addEventListener('click', () => void this.copy(button('copy-command'), this.command()));
     const help = byId('help', HTMLDialogElement);
@@ -435,10 +436,10 @@ class App {
     button('fold').setAttribute('aria-expanded', String(!settings.hidden));
   }
 
-  private async save(): Promise<void> {
-    const picture = await this.view.capture().catch(() => undefined);
+  private async save(type: 'png' | 'image/x-exr', ending: string): Promise<void> {
+    const picture = await this.view.capture({ type }).catch(() => undefined);
     if (!picture) return;
-    save(picture, `${this.fileName()}.png`);
+    save(picture, `${this.fileName()}.${ending}`);
   }
 
   /** What pictures are called, without an ending. */

@@ -541,12 +541,17 @@ export class RestirViewer extends EventTarget {
 
   // What is there
 
-  /** The picture as shown: a PNG file, or `ImageData` of sRGB bytes, row-major from the top. */
+  /**
+   * The picture as shown: a PNG file, or `ImageData` of sRGB bytes, row-major from the top. Or, as `image/x-exr`, an OpenEXR file with what
+   * was averaged, linear Rec. 709 radiance, and albedo, normal, depth and motion of what the pixels of the last frame see first, as
+   * `restir render` writes it.
+   */
   capture(options: { type: 'rgba' }): Promise<ImageData>;
-  capture(options?: { type: 'png' }): Promise<Blob>;
-  capture({ type = 'png' }: { type?: 'png' | 'rgba' } = {}): Promise<ImageData | Blob> {
+  capture(options?: { type: 'png' | 'image/x-exr' }): Promise<Blob>;
+  capture({ type = 'png' }: { type?: 'png' | 'rgba' | 'image/x-exr' } = {}): Promise<ImageData | Blob> {
     return this.reported(async () => {
-      if (type !== 'png' && type !== 'rgba') throw invalid(`${String(type)} is neither png nor rgba.`);
+      if (type === 'image/x-exr') return this.exr();
+      if (type !== 'png' && type !== 'rgba') throw invalid(`${String(type)} is none of png, rgba, image/x-exr.`);
       const picture = await this.picture();
       return type === 'rgba' ? picture : pngOf(picture);
     });
@@ -1038,6 +1043,25 @@ export class RestirViewer extends EventTarget {
 
   private picture(): Promise<ImageData> {
     return this.call((viewer) => this.read(viewer));
+  }
+
+  private async exr(): Promise<Blob> {
+    const picture = await this.call(async (viewer) => {
+      const [width, height] = this.rendered;
+      const attributes = {
+        'restir.frames': String(viewer.frames()),
+        'restir.parameters': viewer.parameters(),
+        'restir.seed': String(this.settings.seed),
+        'restir.technique': this.settings.technique,
+        'restir.version': description().version,
+      };
+      const pixels = (await viewer.read_picture()) as Float32Array;
+      const { buffer } = (await viewer.read_surfaces()) as Uint8Array;
+      return { width, height, pixels, surfaces: new Float32Array(buffer), attributes };
+    });
+    // Few pictures are saved so: fetched only now.
+    const { encodeExr } = await import('./exr.js');
+    return encodeExr(picture);
   }
 
   private async read(viewer: Viewer): Promise<ImageData> {

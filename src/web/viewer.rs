@@ -313,6 +313,14 @@ impl Viewer {
         })
     }
 
+    /// What the last frame saw first: the bytes that [`Renderer::read_surfaces`] describes.
+    pub fn read_surfaces(&self) -> js_sys::Promise {
+        let read = self.renderer.read_surfaces();
+        wasm_bindgen_futures::future_to_promise(async move {
+            Ok(js_sys::Uint8Array::from(read.await.js()?.as_slice()).into())
+        })
+    }
+
     /// Which settings, as they are now, bias the picture, as JSON: `parameter` and `why`.
     pub fn biases(&self) -> String {
         serde_json::json!(self.renderer.biases()).to_string()
