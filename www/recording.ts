@@ -1,19 +1,50 @@
-// Moving pictures: a video of what is shown, and the pictures of an animation one by one.
+// Moving pictures: a video of what is shown, and an animation rendered picture by picture at exact moments.
 import type { Compare } from './compare.js';
 import { save } from './files.js';
 import { byId, showError } from './notices.js';
 import { Video } from './video.js';
 import type { RestirViewer } from './viewer.js';
-import { type ZipEntry, zip } from './zip.js';
 
 const number = (id: string) => {
   const input = byId(id, HTMLInputElement);
   return input.checkValidity() && input.value !== '' ? Number(input.value) : undefined;
 };
 
+/** What the pictures of an animation are put into. */
+interface Film {
+  ending: string;
+  /** Renders the next moment, in seconds, of so many averaged frames, and puts it in. */
+  add(moment: number, samples: number): Promise<void>;
+  finish(): Promise<Blob>;
+  /** Lets go of it, finished or not. */
+  close(): void;
+}
+
+// What makes files is fetched when it is used, for few visitors do.
+
+/** Numbered PNG files called `name`. */
+async function archiveOf(view: RestirViewer, name: string): Promise<Film> {
+  const { zip } = await import('./zip.js');
+  const entries: { name: string; bytes: Uint8Array<ArrayBuffer> }[] = [];
+  const add = async (moment: number, samples: number) => {
+    const png = await view.renderAt(moment, samples);
+    entries.push({ name: `${name}-${String(entries.length).padStart(4, '0')}.png`, bytes: new Uint8Array(await png.arrayBuffer()) });
+  };
+  return { ending: 'zip', add, finish: async () => zip(entries), close: () => undefined };
+}
+
+/** A video of `rate` frames a second. */
+async function videoOf(view: RestirViewer, rate: number): Promise<Film> {
+  const { MomentVideo } = await import('./moment-video.js');
+  const video = await MomentVideo.of(...view.size, rate);
+  const add = async (moment: number, samples: number) => video.add(await view.renderAt(moment, samples, { type: 'rgba' }));
+  return { ending: 'webm', add, finish: () => video.finish(), close: () => video.close() };
+}
+
 export class Recording {
   private readonly videoButton = byId('record-video', HTMLButtonElement);
   private readonly picturesButton = byId('record-pictures', HTMLButtonElement);
+  private readonly exactButton = byId('record-exact', HTMLButtonElement);
   private readonly words = byId('record-words', HTMLElement);
   private stopVideo: (() => void) | undefined;
   private pictures: AbortController | undefined;
@@ -25,7 +56,10 @@ export class Recording {
     private readonly name: () => string,
   ) {
     this.videoButton.addEventListener('click', () => (this.stopVideo ? this.stopVideo() : void this.recordVideo()));
-    this.picturesButton.addEventListener('click', () => (this.pictures ? this.pictures.abort() : void this.recordPictures()));
+    const record = (film: (rate: number) => Promise<Film>) => (event: Event) =>
+      this.pictures ? this.pictures.abort() : void this.recordMoments(event.currentTarget as HTMLButtonElement, film);
+    this.picturesButton.addEventListener('click', record(() => archiveOf(view, this.name())));
+    this.exactButton.addEventListener('click', record((rate) => videoOf(view, rate)));
   }
 
   /** Draws each finished frame on a canvas of its own, as large as the picture is now, until it is stopped. */
@@ -72,8 +106,8 @@ export class Recording {
     await draw();
   }
 
-  /** Renders an animation's pictures at their moments, and saves them as one archive. */
-  private async recordPictures(): Promise<void> {
+  /** Renders an animation's pictures at their moments, and saves them as one file; `button` cancels it meanwhile. */
+  private async recordMoments(button: HTMLButtonElement, filmOf: (rate: number) => Promise<Film>): Promise<void> {
     const { view } = this;
     const [count, rate, samples] = [number('record-count'), number('record-rate'), number('record-samples')];
     if (count === undefined || rate === undefined || samples === undefined) {
@@ -81,31 +115,36 @@ export class Recording {
       return;
     }
     const { signal } = (this.pictures = new AbortController());
-    this.picturesButton.textContent = 'Cancel';
+    const others = [this.picturesButton, this.exactButton].filter((each) => each !== button);
+    const label = button.textContent;
+    button.textContent = 'Cancel';
+    for (const other of others) other.disabled = true;
     const start = view.settings.time;
-    const entries: ZipEntry[] = [];
     const { scene } = view;
     const { size } = view.settings;
+    let film: Film | undefined;
     try {
+      film = await filmOf(rate);
       // All pictures are of one size.
       await view.setSize(view.size);
       for (let at = 0; at < count && !signal.aborted; at++) {
         if (view.scene !== scene || view.loading) throw { code: 'CANCELLED', message: 'Another scene was chosen: no pictures were saved.' };
         this.words.textContent = `Picture ${at + 1} of ${count}`;
-        const png = await view.renderAt(start + at / rate, samples);
-        entries.push({ name: `${this.name()}-${String(at).padStart(4, '0')}.png`, bytes: new Uint8Array(await png.arrayBuffer()) });
+        await film.add(start + at / rate, samples);
       }
-      if (!signal.aborted) save(zip(entries), `${this.name()}.zip`);
+      if (!signal.aborted) save(await film.finish(), `${this.name()}.${film.ending}`);
       this.words.textContent = signal.aborted ? 'Cancelled.' : `${count} pictures saved.`;
     } catch (error) {
       this.words.textContent = '';
       showError(error);
     } finally {
+      film?.close();
       this.pictures = undefined;
-      this.picturesButton.textContent = 'Save pictures';
+      button.textContent = label;
+      for (const other of others) other.disabled = false;
       await view.setSize(size).catch(() => undefined);
       // Back to the moment that was shown, unless something else was asked for.
-      if (view.scene === scene && !view.loading) await view.show(view.settings, view.scene).catch(() => undefined);
+      if (film && view.scene === scene && !view.loading) await view.show(view.settings, view.scene).catch(() => undefined);
     }
   }
 }

@@ -566,8 +566,13 @@ export class RestirViewer extends EventTarget {
     });
   }
 
-  /** Renders a moment of the scene, in seconds, with so many averaged frames, as a link to it would; the settings stay. As PNG. */
-  renderAt(seconds: number, frames: number): Promise<Blob> {
+  /**
+   * Renders a moment of the scene, in seconds, with so many averaged frames, as a link to it would; the settings stay. What it resolves to
+   * is what `capture` says of the types.
+   */
+  renderAt(seconds: number, frames: number, options: { type: 'rgba' }): Promise<ImageData>;
+  renderAt(seconds: number, frames: number, options?: { type: 'png' }): Promise<Blob>;
+  renderAt(seconds: number, frames: number, { type = 'png' }: { type?: 'png' | 'rgba' } = {}): Promise<ImageData | Blob> {
     return this.reported(async () => {
       checkRange('time', seconds, -1e9, 1e9);
       checkRange('frames', frames, 1, 0xffffffff, true);
@@ -581,7 +586,7 @@ export class RestirViewer extends EventTarget {
         }
         return this.read(viewer);
       });
-      return pngOf(picture);
+      return type === 'rgba' ? picture : pngOf(picture);
     });
   }
 
