@@ -27,7 +27,7 @@ async function buildModule(folder, name, limit) {
 }
 
 /** What the page begins with. */
-export const buildWasm = () => buildModule(root, 'restir', 400);
+export const buildWasm = () => buildModule(root, 'restir', 420);
 
 /** What it fetches for a file. */
 export const buildLoader = () => buildModule(join(root, 'loader'), 'loader', 600);

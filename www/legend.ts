@@ -6,8 +6,8 @@ import type { RestirViewer } from './viewer.js';
 /** The share of pixels that may lie beyond either end after a fit. */
 const beyond = 0.01;
 
-/** A number with three figures, as people and parameters read it. */
-const short = (value: number) => String(Number(value.toPrecision(3)));
+/** A number with four figures, as people and parameters read it. */
+const short = (value: number) => String(Number(value.toPrecision(4)));
 
 /** The ends of the numbers of a picture, those of few pixels left out; undefined where all are alike. */
 export function fittedRange(values: Float32Array, logarithmic: boolean): [number, number] | undefined {

@@ -28,11 +28,12 @@ export async function openEmbedding() {
   return { browser, url: server.url, folder, close };
 }
 
-/** Opens the page with `query`. `problems` collects console errors, exceptions and failed requests. `before` runs ahead of its scripts. */
-export async function openPage({ browser, url }, query, before) {
+/** Opens the page with `query`. `problems` collects console errors, exceptions and failed requests. `before` runs ahead of its scripts; `prepare` is given the page first. */
+export async function openPage({ browser, url }, query, before, prepare) {
   const page = await browser.newPage();
   page.setDefaultTimeout(patience);
   await page.setViewport({ width: 640, height: 400 });
+  prepare?.(page);
   const problems = [];
   page.on('console', (message) => message.type() === 'error' && problems.push(message.text()));
   page.on('pageerror', (error) => problems.push(String(error)));
