@@ -2,6 +2,7 @@
 
 mod forest;
 mod motion;
+mod walked;
 
 use crate::environment_pyramid::EnvironmentPyramid;
 use crate::error::{Error, Result};
@@ -14,16 +15,14 @@ use crate::pace::{Pace, SLICE_BYTES};
 use crate::scene::flat::{FlatEnvironment, TextureArray};
 use crate::scene::gpu_types::{
     LIGHT_ENVIRONMENT, LIGHT_SUN, LIGHT_TRIANGLE, Light, MATERIAL_UNLIT, MATERIAL_VOLUME, MaterialExtensions, NONE,
-    TRIANGLE_ALPHA_MASK, Triangle,
+    TRIANGLE_ALPHA_MASK,
 };
 use crate::scene::stage::Stage;
 use crate::scene::{FlatScene, Shape};
 use forest::Forest;
 use glam::{UVec2, Vec3};
 use motion::Motion;
-
-/// Triangles in the first of the two buffers: 128 MiB, what every WebGPU device can bind. As in `shaders/scene/data.wgsl`.
-const FIRST_TRIANGLES: usize = (128 << 20) / size_of::<Triangle>();
+use walked::Walked;
 
 /// The texture arrays as shaders name them. A scene may have fewer.
 const TEXTURE_ARRAYS: [&str; 4] = ["textures_0", "textures_1", "textures_2", "textures_3"];
@@ -31,9 +30,7 @@ const TEXTURE_ARRAYS: [&str; 4] = ["textures_0", "textures_1", "textures_2", "te
 /// A [`FlatScene`] on the device.
 #[derive(Debug)]
 pub struct GpuScene {
-    nodes: wgpu::Buffer,
-    /// The first [`FIRST_TRIANGLES`], and all others.
-    triangles: [wgpu::Buffer; 2],
+    walked: Walked,
     lights: wgpu::Buffer,
     attributes: DataTexture,
     materials: DataTexture,
@@ -58,9 +55,8 @@ impl Drop for GpuScene {
     /// Frees what is large at once: on the web it would otherwise lie about until a garbage collection. Frames that were submitted still
     /// have it.
     fn drop(&mut self) {
-        for buffer in [&self.nodes, &self.triangles[0], &self.triangles[1], &self.lights] {
-            buffer.destroy();
-        }
+        self.walked.destroy();
+        self.lights.destroy();
         for texture in self.textures.iter().chain([&self.environment_radiance, &self.environment_alias]) {
             texture.texture().destroy();
         }
@@ -105,19 +101,8 @@ impl GpuScene {
         };
         let mut forest = Forest::new(scene, pace).await?;
         let (motion, arrays) = Motion::lay_out(scene, &mut forest);
-        let (first_triangles, rest) = arrays.triangles.split_at(arrays.triangles.len().min(FIRST_TRIANGLES));
-        let point = [bytemuck::Zeroable::zeroed()];
-        Ok(GpuScene {
-            nodes: gpu.storage_in_slices("the nodes of the BVH", &forest.nodes, pace).await?,
-            triangles: [
-                gpu.storage_in_slices("triangles", first_triangles, pace).await?,
-                gpu.storage_in_slices(
-                    "the triangles after the first 2796202",
-                    if rest.is_empty() { &point } else { rest },
-                    pace,
-                )
-                .await?,
-            ],
+        let mut gpu_scene = GpuScene {
+            walked: Walked::upload(gpu, &forest.nodes, &arrays.triangles, pace).await?,
             attributes: DataTexture::in_slices(gpu, "attributes", &arrays.attributes, pace).await?,
             materials: DataTexture::new(gpu, "materials", &scene.materials)?,
             material_extensions: DataTexture::new(gpu, "material extensions", &scene.material_extensions)?,
@@ -157,7 +142,10 @@ impl GpuScene {
             pyramid: None,
             motion,
             features: features(scene),
-        })
+        };
+        let data = [&gpu_scene.attributes, &gpu_scene.materials, &gpu_scene.material_extensions, &gpu_scene.instances];
+        gpu_scene.features.data_rows = gpu_scene.walked.has_rows() || data.into_iter().any(DataTexture::has_rows);
+        Ok(gpu_scene)
     }
 
     /// Brings the device up to date with what moves: this frame's transforms, shapes and lights, and those of the frame
@@ -218,19 +206,6 @@ impl GpuScene {
         self.pyramid.as_ref().map_or(Ok(()), |pyramid| pyramid.record(recorder))
     }
 
-    /// Overwrites triangles from index `first` on, in whichever buffer they lie.
-    fn write_triangles(&self, gpu: &Gpu, first: u32, triangles: &[Triangle]) {
-        let first = first as usize;
-        let (low, high) = triangles.split_at(FIRST_TRIANGLES.saturating_sub(first).min(triangles.len()));
-        let write = |buffer: &wgpu::Buffer, index: usize, part: &[Triangle]| {
-            if !part.is_empty() {
-                gpu.queue.write_buffer(buffer, (index * size_of::<Triangle>()) as u64, bytemuck::cast_slice(part));
-            }
-        };
-        write(&self.triangles[0], first, low);
-        write(&self.triangles[1], (first + low.len()).saturating_sub(FIRST_TRIANGLES), high);
-    }
-
     /// Index in `nodes` of the root of everything as it was in the frame before.
     pub fn previous_top_level(&self) -> u32 {
         self.motion.as_ref().map_or(self.top_level, |motion| motion.previous_top_level)
@@ -249,9 +224,7 @@ impl GpuScene {
     /// Binds everything for the passes of a frame.
     pub fn share<'a>(&'a self, recorder: &mut Recorder<'a>) {
         recorder.features = self.features;
-        recorder.share("nodes", &self.nodes);
-        recorder.share("triangles", &self.triangles[0]);
-        recorder.share("triangles_rest", &self.triangles[1]);
+        self.walked.share(recorder);
         recorder.share("lights", &self.lights);
         recorder.share("attributes", &self.attributes.view);
         recorder.share("materials", &self.materials.view);
@@ -283,7 +256,7 @@ fn features(scene: &FlatScene) -> SceneFeatures {
         dimmed_emitters: scene.light_powers.iter().take(scene.first_punctual as usize).any(|&power| power != NONE),
         instances: scene.has_top_level(),
         motion: !scene.rig.is_still(),
-        many_triangles: motion::triangle_count(scene) > FIRST_TRIANGLES,
+        many_triangles: motion::triangle_count(scene) > walked::FIRST_TRIANGLES,
         transmission: any(|m| m.transmission > 0.0),
         volumes: any(|m| m.flags & MATERIAL_VOLUME != 0),
         dispersion: any(|m| m.flags & MATERIAL_VOLUME != 0 && m.dispersion > 0.0),

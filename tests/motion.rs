@@ -27,6 +27,25 @@ fn two_moments(scene: &FlatScene, camera: usize, times: [f64; 2]) -> (Renderer, 
     (renderer, cameras, motion)
 }
 
+/// Shapes, places and both top levels reach the device wherever the adapter's kernels look for them.
+#[test]
+fn kernels_for_gpus_and_for_software_show_the_same_moments() {
+    let flat = flatten(&restir::scene::builtin::make("motion").unwrap());
+    let pictures = [gpu(), gpu().posing_as_hardware()].map(|gpu| {
+        let mut renderer = renderer(&gpu, flat.clone(), SIZE, "path-tracer", &[("render.max_depth", "2")]);
+        [0.2, 0.7].map(|time| {
+            renderer.set_time(time);
+            render(&mut renderer, 2)
+        })
+    });
+    for (own, for_gpus) in pictures[0].iter().zip(&pictures[1]) {
+        let differ =
+            own.pixels.iter().zip(&for_gpus.pixels).filter(|(a, b)| (0..3).any(|i| (a[i] - b[i]).abs() > 1e-3));
+        let differ = differ.count();
+        assert!(differ * 200 < own.pixels.len(), "{differ} of {} pixels differ", own.pixels.len());
+    }
+}
+
 fn project(camera: &Camera, p: Vec3) -> Vec2 {
     let clip = camera_view(camera, SIZE.into()).world_to_clip * p.extend(1.0);
     (Vec2::new(clip.x, -clip.y) / clip.w * 0.5 + 0.5) * Vec2::new(SIZE[0] as f32, SIZE[1] as f32)

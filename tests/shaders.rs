@@ -69,7 +69,8 @@ impl Drop for TemporaryFolder {
 fn every_pass_builds_a_pipeline() {
     let gpu = fresh_gpu();
     for shader in table::ALL.iter().filter(|s| s.workgroup_size[0] > 0) {
-        for features in [SceneFeatures::ALL, SceneFeatures::NONE] {
+        let software = SceneFeatures { is_software: true, ..SceneFeatures::ALL };
+        for features in [SceneFeatures::ALL, SceneFeatures::NONE, software] {
             gpu.pipeline(shader, features);
             gpu.check().unwrap_or_else(|e| panic!("{} for {features:?}: {e}", shader.file));
         }

@@ -137,6 +137,12 @@ override scene_has_instances: bool = true;
 override scene_has_motion: bool = true;
 // More triangles than one storage binding holds.
 override scene_has_many_triangles: bool = true;
+// More records than one row of a data texture holds (scene/data.wgsl).
+override scene_has_data_rows: bool = true;
+
+// No feature of a scene: kernels for an adapter that computes on the CPU. Nodes and triangles then lie in textures
+// (src/gpu_scene/walked.rs), and code is left out that only GPUs gain by (docs/performance.md).
+override is_software: bool = false;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> nodes: array<WideNode>;
@@ -152,4 +158,6 @@ override scene_has_many_triangles: bool = true;
 @group(0) @binding(11) var textures_1: texture_2d_array<f32>;
 @group(0) @binding(12) var textures_2: texture_2d_array<f32>;
 @group(0) @binding(13) var textures_3: texture_2d_array<f32>;
+@group(0) @binding(14) var node_texels: texture_2d<u32>;
+@group(0) @binding(15) var triangle_texels: texture_2d<u32>;
 @group(0) @binding(16) var environment_pyramid: texture_2d<f32>;

@@ -125,12 +125,14 @@ fn intersect_triangle(index: u32, instance: u32, origin: vec3f, direction: vec3f
     let w2 = side * dot(direction, q);
     let sum = side * determinant;
     let is_outside = min(min(w1, w2), sum - w1 - w2) < -rounding;
-    if is_outside || sum == 0.0 || (side < 0.0 && (triangle.flags & TRIANGLE_DOUBLE_SIDED) == 0u) {
+    let is_hidden = (side < 0.0) & ((triangle.flags & TRIANGLE_DOUBLE_SIDED) == 0u);
+    // A software adapter goes on under a mask, which costs more than what is left.
+    if !is_software && (is_outside || is_hidden || sum == 0.0) {
         return;
     }
     let t = dot(e2, q) / determinant;
-    // Not `t >= hit.t`, which is false for the NaN of a ray within the plane.
-    if !(t > 0.0 && t < (*hit).t) {
+    // `t` may be the NaN of a ray within the plane, for which no comparison holds.
+    if is_outside | is_hidden | (sum == 0.0) | !((t > 0.0) & (t < (*hit).t)) {
         return;
     }
     let u = clamp(w1 / sum, 0.0, 1.0);
@@ -146,8 +148,12 @@ fn safe_inverse(direction: vec3f) -> vec3f {
     return 1.0 / select(direction, vec3f(1e-20), abs(direction) < vec3f(1e-20));
 }
 
-// The four bytes of a word as numbers.
+// The four bytes of a word as numbers, in software over 255: a shift by a vector is done lane by lane there, and this is not.
+// Its rounding takes a quarter of the margin that `bvh_visit` allows for all.
 fn bytes(word: u32) -> vec4f {
+    if is_software {
+        return unpack4x8unorm(word);
+    }
     return vec4f(unpack4xU8(word));
 }
 
@@ -161,7 +167,7 @@ fn bvh_pop(stack: ptr<function, array<u32, BVH_STACK>>, depth: ptr<function, u32
     if scene_has_instances && entry == LEAVE {
         return LEAVE;
     }
-    return nodes[entry >> 2u].children[entry & 3u];
+    return load_child(entry);
 }
 
 // Tests the boxes of a node's four children, stacks those that the ray meets within [0, t_max], the nearest last, and gives
@@ -173,23 +179,26 @@ fn bvh_visit(
     if counts_pixels {
         nodes_visited += 1u;
     }
-    let grid = nodes[node].grid;
-    let a = nodes[node].planes_0;
-    let b = nodes[node].planes_1;
+    let boxes = load_boxes(node);
+    let grid = boxes.grid;
+    let a = boxes.planes_0;
+    let b = boxes.planes_1;
     let steps = vec3f(
-        bitcast<f32>((grid.w & 0xffu) << 23u), bitcast<f32>((grid.w & 0xff00u) << 15u), bitcast<f32>((grid.w & 0xff0000u) << 7u)
+        bitcast<f32>((grid.w & 0xffu) * 0x800000u), bitcast<f32>((grid.w & 0xff00u) * 0x8000u),
+        bitcast<f32>((grid.w & 0xff0000u) * 0x80u)
     ) * inverse;
+    let scaled = select(steps, 255.0 * steps, is_software); // by what `bytes` gives
     let start = (bitcast<vec3f>(grid.xyz) - origin) * inverse;
     let margin = abs(start) * 6e-7 + abs(steps) * 2e-4;
     let near = start - margin;
     let far = start + margin;
     let back = inverse < vec3f(0.0);
-    let enter_x = fma(bytes(select(a.x, a.w, back.x)), vec4f(steps.x), vec4f(near.x));
-    let enter_y = fma(bytes(select(a.y, b.x, back.y)), vec4f(steps.y), vec4f(near.y));
-    let enter_z = fma(bytes(select(a.z, b.y, back.z)), vec4f(steps.z), vec4f(near.z));
-    let leave_x = fma(bytes(select(a.w, a.x, back.x)), vec4f(steps.x), vec4f(far.x));
-    let leave_y = fma(bytes(select(b.x, a.y, back.y)), vec4f(steps.y), vec4f(far.y));
-    let leave_z = fma(bytes(select(b.y, a.z, back.z)), vec4f(steps.z), vec4f(far.z));
+    let enter_x = fma(bytes(select(a.x, a.w, back.x)), vec4f(scaled.x), vec4f(near.x));
+    let enter_y = fma(bytes(select(a.y, b.x, back.y)), vec4f(scaled.y), vec4f(near.y));
+    let enter_z = fma(bytes(select(a.z, b.y, back.z)), vec4f(scaled.z), vec4f(near.z));
+    let leave_x = fma(bytes(select(a.w, a.x, back.x)), vec4f(scaled.x), vec4f(far.x));
+    let leave_y = fma(bytes(select(b.x, a.y, back.y)), vec4f(scaled.y), vec4f(far.y));
+    let leave_z = fma(bytes(select(b.y, a.z, back.z)), vec4f(scaled.z), vec4f(far.z));
     // Above 0, for the bits of positive numbers order as the numbers do.
     let enter = max(max(enter_x, enter_y), max(enter_z, vec4f(1e-37)));
     let leave = min(min(leave_x, leave_y), min(leave_z, vec4f(t_max)));
@@ -220,7 +229,7 @@ fn bvh_visit(
         (*stack)[*depth] = here | (second & 3u);
         *depth += 1u;
     }
-    return nodes[node].children[first & 3u];
+    return load_child(here | (first & 3u));
 }
 
 // A ray on its way through the tree.
@@ -247,7 +256,7 @@ fn walk_start(top_level: u32, origin: vec3f, direction: vec3f, t_max: f32) -> Wa
 }
 
 // At most two nodes and then a leaf. Lanes that go different ways meet again after each turn, and a turn costs more than
-// its nodes (docs/performance.md).
+// its nodes (docs/performance.md). In software one node: it is paid for by every turn, whether any lane wants it or not.
 fn walk_turn(walk: ptr<function, Walk>, stack: ptr<function, array<u32, BVH_STACK>>, any_hit: bool) {
     var next = (*walk).next;
     var depth = (*walk).depth;
@@ -255,7 +264,7 @@ fn walk_turn(walk: ptr<function, Walk>, stack: ptr<function, array<u32, BVH_STAC
     if next < LEAVE {
         next = bvh_visit(next, (*walk).origin, (*walk).inverse, hit.t, stack, &depth);
     }
-    if next < LEAVE {
+    if !is_software && next < LEAVE {
         next = bvh_visit(next, (*walk).origin, (*walk).inverse, hit.t, stack, &depth);
     }
     if next > DONE {

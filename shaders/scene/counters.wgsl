@@ -8,6 +8,11 @@ var<workgroup> workgroup_rays: atomic<u32>;
 
 // Adds the rays of a whole workgroup at once. To be called by every invocation, in uniform control flow.
 fn flush_ray_count(local_index: u32) {
+    // There a barrier makes fibres of all invocations, on threads that wait for each other.
+    if is_software {
+        atomicAdd(&counters.rays, rays_traced);
+        return;
+    }
     atomicAdd(&workgroup_rays, rays_traced);
     workgroupBarrier();
     if local_index == 0u {

@@ -8,10 +8,51 @@ const FIRST_TRIANGLES = 2796202u; // 128 MiB of them
 const DATA_ROW_BITS = 13u; // texels of a row: 8192
 
 fn data_texel(index: u32) -> vec2u {
+    if !scene_has_data_rows {
+        return vec2u(index, 0u);
+    }
     return vec2u(index & ((1u << DATA_ROW_BITS) - 1u), index >> DATA_ROW_BITS);
 }
 
+// Where a node's boxes lie, and how they are written down.
+struct NodeBoxes {
+    grid: vec4u,
+    planes_0: vec4u,
+    planes_1: vec4u,
+}
+
+// Four texels a node, which a row holds in full.
+fn node_texel(node: u32, texel: u32) -> vec4u {
+    let first = data_texel(node * 4u);
+    return textureLoad(node_texels, first + vec2u(texel, 0u), 0);
+}
+
+fn load_boxes(node: u32) -> NodeBoxes {
+    if is_software {
+        return NodeBoxes(node_texel(node, 0u), node_texel(node, 1u), node_texel(node, 2u));
+    }
+    return NodeBoxes(nodes[node].grid, nodes[node].planes_0, nodes[node].planes_1);
+}
+
+// The reference to child `entry & 3` of node `entry >> 2`.
+fn load_child(entry: u32) -> u32 {
+    if is_software {
+        return textureLoad(node_texels, data_texel(entry | 3u), 0)[entry & 3u];
+    }
+    return nodes[entry >> 2u].children[entry & 3u];
+}
+
+fn triangle_texel(triangle: u32, texel: u32) -> vec4u {
+    return textureLoad(triangle_texels, data_texel(triangle * 3u + texel), 0);
+}
+
 fn load_triangle(index: u32) -> Triangle {
+    if is_software {
+        let a = triangle_texel(index, 0u);
+        let b = triangle_texel(index, 1u);
+        let c = triangle_texel(index, 2u);
+        return Triangle(bitcast<vec3f>(a.xyz), a.w, bitcast<vec3f>(b.xyz), b.w, bitcast<vec3f>(c.xyz), c.w);
+    }
     if scene_has_many_triangles && index >= FIRST_TRIANGLES {
         return triangles_rest[index - FIRST_TRIANGLES];
     }

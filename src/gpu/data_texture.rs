@@ -45,6 +45,11 @@ impl DataTexture {
         Ok(data_texture)
     }
 
+    /// Whether a record's place depends on more than a column.
+    pub fn has_rows(&self) -> bool {
+        self.texture.height() > 1
+    }
+
     /// A texture for `bytes` bytes.
     fn empty(gpu: &Gpu, label: &str, bytes: usize) -> Result<Self> {
         let texels = (bytes as u64 / TEXEL).max(1);

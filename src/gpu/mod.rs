@@ -50,6 +50,7 @@ pub struct Gpu {
     pub has_timestamps: bool,
     albedo_table: wgpu::TextureView,
     adapter: wgpu::AdapterInfo,
+    poses_as_hardware: bool,
     failure: Arc<Mutex<Option<String>>>,
     pipelines: Arc<Mutex<HashMap<PipelineKey, wgpu::ComputePipeline>>>,
     /// Of the bind groups of passes, by id.
@@ -135,6 +136,7 @@ impl Gpu {
             queue,
             has_timestamps,
             adapter: adapter.get_info(),
+            poses_as_hardware: false,
             failure,
             pipelines: Arc::default(),
             layouts: Arc::default(),
@@ -154,6 +156,18 @@ impl Gpu {
     /// Whether the adapter computes on the CPU.
     pub fn is_software(&self) -> bool {
         self.adapter.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// Whether kernels are those for software adapters, which load a texel at once but gather what lies in buffers word by word
+    /// (docs/performance.md).
+    pub fn runs_software_kernels(&self) -> bool {
+        self.is_software() && !self.poses_as_hardware
+    }
+
+    /// The same device, with kernels for GPUs though it may be none: so these are tested where there is no GPU.
+    #[must_use]
+    pub fn posing_as_hardware(self) -> Self {
+        Gpu { poses_as_hardware: true, ..self }
     }
 
     /// The first error the device reported since it was made, if any.

@@ -129,6 +129,8 @@ scene_features! {
         motion,
         /// More triangles than one storage binding holds.
         many_triangles,
+        /// A data texture of more than one row.
+        data_rows,
         /// Any material that transmits light.
         transmission,
         /// Any material that bounds a medium.
@@ -153,6 +155,8 @@ scene_features! {
         energy_compensation,
         /// `render.conserving_mix`.
         conserving_mix,
+        /// Kernels for an adapter that computes on the CPU ([`Gpu::runs_software_kernels`]).
+        is_software,
         /// Lights chosen by search in the cumulative distribution (src/techniques/candidates.rs).
         light_choice_cdf,
         /// Lights chosen all alike.

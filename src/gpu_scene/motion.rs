@@ -7,7 +7,7 @@ use crate::gpu::Gpu;
 use crate::scene::FlatScene;
 use crate::scene::bvh::wide;
 use crate::scene::flat::{FlatInstance, levels};
-use crate::scene::gpu_types::{BvhNode, Instance, Light, NONE, Triangle, TriangleAttributes, WideNode};
+use crate::scene::gpu_types::{BvhNode, Instance, Light, NONE, Triangle, TriangleAttributes};
 use crate::scene::stage::{Body, Stage};
 use glam::{Mat4, Vec3, Vec4};
 use std::borrow::Cow;
@@ -111,8 +111,8 @@ impl Motion {
         self.now = 1 - self.now;
         for (i, (body, places)) in stage.bodies.iter().zip(&self.places).enumerate() {
             let upload = |(root, first): (u32, u32), nodes: &[BvhNode], triangles: &[Triangle], attributes: &[_]| {
-                write_nodes(gpu, device, root, &wide::collapse_refitted(nodes, 0, root, first).nodes);
-                device.write_triangles(gpu, first, triangles);
+                device.walked.write_nodes(gpu, root, &wide::collapse_refitted(nodes, 0, root, first).nodes);
+                device.walked.write_triangles(gpu, first, triangles);
                 device.attributes.write(gpu, u64::from(first) * ATTRIBUTE_TEXELS, attributes);
             };
             upload(places[self.now], &body.nodes, &body.triangles, &body.attributes);
@@ -166,9 +166,9 @@ impl Motion {
                 .collect();
             let now = levels::top_level(&boxes, 0);
             let before = if stage.has_moved() && !self.top_level.is_empty() { &self.top_level } else { &now };
-            write_nodes(gpu, device, device.top_level, &wide::collapse(&now, 0, device.top_level, 0).nodes);
+            device.walked.write_nodes(gpu, device.top_level, &wide::collapse(&now, 0, device.top_level, 0).nodes);
             let (root, twins) = (self.previous_top_level, device.instance_count);
-            write_nodes(gpu, device, root, &wide::collapse(before, 0, root, twins).nodes);
+            device.walked.write_nodes(gpu, root, &wide::collapse(before, 0, root, twins).nodes);
             self.top_level = now;
         }
 
@@ -212,11 +212,6 @@ fn name_lights(gpu: &Gpu, device: &GpuScene, scene: &FlatScene, stage: &Stage, b
     lights.sort_unstable_by_key(|&(number, _)| number);
     let lights: Vec<Light> = lights.into_iter().map(|(_, light)| light).collect();
     write_lights(gpu, device, instance.first_light, &lights);
-}
-
-fn write_nodes(gpu: &Gpu, device: &GpuScene, first: u32, nodes: &[WideNode]) {
-    let offset = u64::from(first) * size_of::<WideNode>() as u64;
-    gpu.queue.write_buffer(&device.nodes, offset, bytemuck::cast_slice(nodes));
 }
 
 fn write_lights(gpu: &Gpu, device: &GpuScene, first: u32, lights: &[Light]) {
