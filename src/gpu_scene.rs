@@ -169,7 +169,6 @@ impl GpuScene {
 
     /// Bytes on the device.
     pub fn memory(&self) -> u64 {
-        let [first, rest] = &self.triangles;
         let records = [&self.attributes, &self.materials, &self.material_extensions, &self.instances];
         let views = records.into_iter().map(|records| &records.view).chain(&self.textures).chain([
             &self.environment_radiance,
@@ -177,8 +176,7 @@ impl GpuScene {
             &self.no_pyramid,
         ]);
         let views = views.chain(self.pyramid.as_ref().map(|pyramid| &pyramid.view));
-        let buffers = [&self.nodes, first, rest, &self.lights];
-        bytes_of(&buffers.map(Into::into)) + bytes_of(&views.map(Into::into).collect::<Vec<_>>())
+        self.walked.memory() + self.lights.size() + bytes_of(&views.map(Into::into).collect::<Vec<_>>())
     }
 
     /// Whether the environment is sampled by its pyramid, which [`GpuScene::record`] then makes, or by its alias table.

@@ -7,6 +7,7 @@
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::data_texture::DataTexture;
+use crate::gpu::memory::bytes_of;
 use crate::gpu::recorder::Recorder;
 use crate::pace::Pace;
 use crate::scene::gpu_types::{Triangle, WideNode};
@@ -53,6 +54,13 @@ impl Walked {
 
     pub fn has_rows(&self) -> bool {
         self.node_texels.has_rows() || self.triangle_texels.has_rows()
+    }
+
+    /// Bytes on the device.
+    pub fn memory(&self) -> u64 {
+        let [first, rest] = &self.triangles;
+        let texels = [&self.node_texels.view, &self.triangle_texels.view];
+        bytes_of(&[&self.nodes, first, rest].map(Into::into)) + bytes_of(&texels.map(Into::into))
     }
 
     pub fn destroy(&self) {
