@@ -26,9 +26,10 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     if index >= end {
         return;
     }
+    var stack: array<u32, BVH_STACK>;
     var walk = queue_start(index);
     loop {
-        walk_turn(&walk, bench.any_hit != 0u);
+        walk_turn(&walk, &stack, bench.any_hit != 0u);
         if walk.next == DONE {
             write_hit(index, walk.hit);
             index = atomicAdd(&queue_next, 1u);

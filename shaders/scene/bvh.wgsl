@@ -26,9 +26,6 @@ struct Hit {
     instance: u32,
 }
 
-// What the ray that is being walked has still to visit. Not a variable of the loop, which would be cleared for each ray.
-var<private> bvh_stack: array<u32, BVH_STACK>;
-
 // Rays traced by this invocation; passes that count add it to `counters`.
 var<private> rays_traced: u32 = 0u;
 // Nodes that these rays have visited, where pixels are counted.
@@ -160,26 +157,25 @@ fn bytes(word: u32) -> vec4f {
     return vec4f(unpack4xU8(word));
 }
 
-// The next entry of the stack, which keeps (node, child): the child itself is read only when its turn comes.
-fn bvh_pop(depth: ptr<function, u32>) -> u32 {
+// The next thing to do; the stack keeps (node, child), for the child itself is read only when its turn comes.
+fn bvh_pop(stack: ptr<function, array<u32, BVH_STACK>>, depth: ptr<function, u32>) -> u32 {
     if *depth == 0u {
         return DONE;
     }
     *depth -= 1u;
-    return bvh_stack[*depth];
-}
-
-// What an entry stands for.
-fn bvh_read(entry: u32) -> u32 {
-    if entry >= LEAVE {
-        return entry;
+    let entry = (*stack)[*depth];
+    if scene_has_instances && entry == LEAVE {
+        return LEAVE;
     }
     return load_child(entry);
 }
 
 // Tests the boxes of a node's four children, stacks those that the ray meets within [0, t_max], the nearest last, and gives
 // the nearest. Planes are moved apart by more than all rounding, that of `inverse` included, can move them: no box is lost.
-fn bvh_visit(node: u32, origin: vec3f, inverse: vec3f, t_max: f32, depth: ptr<function, u32>) -> u32 {
+fn bvh_visit(
+    node: u32, origin: vec3f, inverse: vec3f, t_max: f32,
+    stack: ptr<function, array<u32, BVH_STACK>>, depth: ptr<function, u32>
+) -> u32 {
     if counts_pixels {
         nodes_visited += 1u;
     }
@@ -217,24 +213,23 @@ fn bvh_visit(node: u32, origin: vec3f, inverse: vec3f, t_max: f32, depth: ptr<fu
     let third = max(inner.x, inner.y);
     let fourth = max(high.x, high.y);
     let none = bitcast<u32>(NO_CHILD) & ~3u;
-    let here = node * 4u;
+    if first >= none {
+        return bvh_pop(stack, depth);
+    }
+    let here = node << 2u;
     if fourth < none {
-        bvh_stack[*depth] = here | (fourth & 3u);
+        (*stack)[*depth] = here | (fourth & 3u);
         *depth += 1u;
     }
     if third < none {
-        bvh_stack[*depth] = here | (third & 3u);
+        (*stack)[*depth] = here | (third & 3u);
         *depth += 1u;
     }
     if second < none {
-        bvh_stack[*depth] = here | (second & 3u);
+        (*stack)[*depth] = here | (second & 3u);
         *depth += 1u;
     }
-    var entry = here | (first & 3u);
-    if first >= none {
-        entry = bvh_pop(depth);
-    }
-    return bvh_read(entry);
+    return load_child(here | (first & 3u));
 }
 
 // A ray on its way through the tree.
@@ -262,15 +257,15 @@ fn walk_start(top_level: u32, origin: vec3f, direction: vec3f, t_max: f32) -> Wa
 
 // At most two nodes and then a leaf. Lanes that go different ways meet again after each turn, and a turn costs more than
 // its nodes (docs/performance.md). In software one node: it is paid for by every turn, whether any lane wants it or not.
-fn walk_turn(walk: ptr<function, Walk>, any_hit: bool) {
+fn walk_turn(walk: ptr<function, Walk>, stack: ptr<function, array<u32, BVH_STACK>>, any_hit: bool) {
     var next = (*walk).next;
     var depth = (*walk).depth;
     var hit = (*walk).hit;
     if next < LEAVE {
-        next = bvh_visit(next, (*walk).origin, (*walk).inverse, hit.t, &depth);
+        next = bvh_visit(next, (*walk).origin, (*walk).inverse, hit.t, stack, &depth);
     }
     if !is_software && next < LEAVE {
-        next = bvh_visit(next, (*walk).origin, (*walk).inverse, hit.t, &depth);
+        next = bvh_visit(next, (*walk).origin, (*walk).inverse, hit.t, stack, &depth);
     }
     if next > DONE {
         let item = next & 0x0fffffffu;
@@ -279,7 +274,7 @@ fn walk_turn(walk: ptr<function, Walk>, any_hit: bool) {
             (*walk).origin = instance_point(item, TO_OBJECT, (*walk).world_origin);
             (*walk).direction = instance_vector(item, TO_OBJECT, (*walk).world_direction);
             (*walk).inverse = safe_inverse((*walk).direction);
-            bvh_stack[depth] = LEAVE;
+            (*stack)[depth] = LEAVE;
             depth += 1u;
             next = instance_texel(item, 6u).x;
         } else {
@@ -290,7 +285,7 @@ fn walk_turn(walk: ptr<function, Walk>, any_hit: bool) {
             if any_hit && hit.triangle != NONE {
                 next = DONE;
             } else {
-                next = bvh_read(bvh_pop(&depth));
+                next = bvh_pop(stack, &depth);
             }
         }
     }
@@ -299,7 +294,7 @@ fn walk_turn(walk: ptr<function, Walk>, any_hit: bool) {
         (*walk).origin = (*walk).world_origin;
         (*walk).direction = (*walk).world_direction;
         (*walk).inverse = safe_inverse((*walk).direction);
-        next = bvh_read(bvh_pop(&depth));
+        next = bvh_pop(stack, &depth);
     }
     (*walk).next = next;
     (*walk).depth = depth;
@@ -309,9 +304,10 @@ fn walk_turn(walk: ptr<function, Walk>, any_hit: bool) {
 // The closest hit with 0 < t < t_max, or, with `any_hit`, whichever is found first. Distances are the same in the space
 // of every mesh, for the ray's direction is not normalised on the way there.
 fn traverse_from(top_level: u32, origin: vec3f, direction: vec3f, t_max: f32, any_hit: bool) -> Hit {
+    var stack: array<u32, BVH_STACK>;
     var walk = walk_start(top_level, origin, direction, t_max);
     while walk.next != DONE {
-        walk_turn(&walk, any_hit);
+        walk_turn(&walk, &stack, any_hit);
     }
     return walk.hit;
 }
