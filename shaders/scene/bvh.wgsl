@@ -124,7 +124,7 @@ fn intersect_triangle(index: u32, instance: u32, origin: vec3f, direction: vec3f
     let w1 = side * dot(s, p);
     let w2 = side * dot(direction, q);
     let sum = side * determinant;
-    let is_outside = min(min(w1, w2), sum - w1 - w2) < -rounding;
+    let is_outside = (w1 < -rounding) | (w2 < -rounding) | (sum - w1 - w2 < -rounding);
     let is_hidden = (side < 0.0) & ((triangle.flags & TRIANGLE_DOUBLE_SIDED) == 0u);
     // A software adapter goes on under a mask, which costs more than what is left.
     if !is_software && (is_outside || is_hidden || sum == 0.0) {
@@ -170,6 +170,21 @@ fn bvh_pop(stack: ptr<function, array<u32, BVH_STACK>>, depth: ptr<function, u32
     return load_child(entry);
 }
 
+// Of numbers of which none is NaN: in a browser the built-in functions take care of those, lane by lane where there is no GPU.
+fn larger(a: vec4f, b: vec4f) -> vec4f {
+    if is_software {
+        return select(a, b, a < b);
+    }
+    return max(a, b);
+}
+
+fn smaller(a: vec4f, b: vec4f) -> vec4f {
+    if is_software {
+        return select(a, b, b < a);
+    }
+    return min(a, b);
+}
+
 // Tests the boxes of a node's four children, stacks those that the ray meets within [0, t_max], the nearest last, and gives
 // the nearest. Planes are moved apart by more than all rounding, that of `inverse` included, can move them: no box is lost.
 fn bvh_visit(
@@ -200,8 +215,8 @@ fn bvh_visit(
     let leave_y = fma(bytes(select(b.x, a.y, back.y)), vec4f(scaled.y), vec4f(far.y));
     let leave_z = fma(bytes(select(b.y, a.z, back.z)), vec4f(scaled.z), vec4f(far.z));
     // Above 0, for the bits of positive numbers order as the numbers do.
-    let enter = max(max(enter_x, enter_y), max(enter_z, vec4f(1e-37)));
-    let leave = min(min(leave_x, leave_y), min(leave_z, vec4f(t_max)));
+    let enter = larger(larger(enter_x, enter_y), larger(enter_z, vec4f(1e-37)));
+    let leave = smaller(smaller(leave_x, leave_y), smaller(leave_z, vec4f(t_max)));
     let keys = bitcast<vec4u>(select(vec4f(NO_CHILD), enter, enter <= leave));
     // Sorted with the number of the child in the lowest bits (a network of five comparisons).
     let k = (keys & vec4u(~3u)) | vec4u(0u, 1u, 2u, 3u);
