@@ -1,23 +1,26 @@
 //! One scene, one technique, one film: what the page and the command line both drive.
 
+mod reading;
+mod settings;
+
+pub use reading::{Auxiliary, FrameCounters};
+
 use crate::error::{Error, Result};
-use crate::film::{Counters, Film};
+use crate::film::Film;
 use crate::frame::{Frame, camera_view};
 use crate::gpu::Gpu;
 use crate::gpu::dissection::{Dissection, Easel};
-use crate::gpu::memory::{Memory, bytes_of};
-use crate::gpu::recorder::{PassTime, Recorder, Recording, Timer};
+use crate::gpu::recorder::{Recorder, Recording, Timer};
 use crate::gpu::shader::table;
 use crate::gpu_scene::{GpuScene, environment_light, sun_light};
 use crate::inspect::{Inspection, Inspector};
-use crate::output::Image;
 use crate::pace::Pace;
-use crate::params::{FilmParams, Params, RenderParams};
+use crate::params::{FilmParams, RenderParams};
 use crate::scene::flat::environment;
 use crate::scene::stage::Stage;
 use crate::scene::{Camera, Environment, FlatScene};
-use crate::techniques::{self, Bias, Technique};
-use crate::view::{Scale, Shown, View, legend_json};
+use crate::techniques::{self, Technique};
+use crate::view::Shown;
 use glam::{UVec2, Vec2};
 
 /// Value of `environment_sampling`.
@@ -25,38 +28,6 @@ const ENVIRONMENT_BY_PYRAMID: u32 = 1;
 
 /// Seconds of scene time between two frames.
 const FRAME_TIME: f64 = 1.0 / 60.0;
-
-/// Auxiliary pictures of the first surface each pixel sees. Zero where there is none.
-#[derive(Debug, Clone, Default)]
-pub struct Auxiliary {
-    /// Linear base colour.
-    pub albedo: Vec<[f32; 3]>,
-    /// World-space unit shading normal.
-    pub normal: Vec<[f32; 3]>,
-    /// Distance along the view axis in metres.
-    pub depth: Vec<f32>,
-    /// How far what the pixel sees has moved since the frame before, in pixels, x to the right and y down. Not zero where
-    /// there is no surface: the background moves with the camera's turn.
-    pub motion: Vec<[f32; 2]>,
-}
-
-/// What was counted.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
-pub struct FrameCounters {
-    /// Rays traced in the last frame.
-    pub rays: u64,
-    /// Pixel samples left out of the film because they were not numbers.
-    pub nan: u64,
-    /// Pixel samples left out of the film because they were infinite.
-    pub inf: u64,
-}
-
-impl FrameCounters {
-    /// Pixel samples left out of the film because they were not finite.
-    pub fn not_finite(&self) -> u64 {
-        self.nan + self.inf
-    }
-}
 
 /// A scene being rendered.
 pub struct Renderer {
@@ -199,19 +170,6 @@ impl Renderer {
         &self.film
     }
 
-    /// Bytes on the device.
-    pub fn memory(&self) -> Memory {
-        let [this, previous] = &self.visibility;
-        let own = [this, previous, &self.albedo_depth, &self.normal, &self.motion].map(Into::into);
-        let timers = [&self.timer, &self.display_timer].into_iter().flatten().map(Timer::memory).sum::<u64>();
-        Memory {
-            scene: self.gpu_scene.memory(),
-            film: self.film.memory() + bytes_of(&own) + bytes_of(&[(&self.frame_uniform).into()]) + timers,
-            technique: self.technique.memory(),
-            inspector: self.inspector.as_ref().map_or(0, Inspector::memory),
-        }
-    }
-
     /// Picture size in pixels.
     pub fn size(&self) -> UVec2 {
         self.film.size()
@@ -262,126 +220,6 @@ impl Renderer {
         Ok(())
     }
 
-    /// Switches to another technique, with its default parameters. On error the old technique stays.
-    ///
-    /// # Errors
-    /// `UNKNOWN_NAME` listing the ids there are; `LIMIT` if its buffers do not fit.
-    pub fn set_technique(&mut self, id: &str) -> Result<()> {
-        let mut technique = (techniques::find(id)?.create)(&self.gpu);
-        technique.prepare(&self.gpu, self.size())?;
-        self.technique = technique;
-        if matches!(self.shown, Shown::Own(_)) {
-            self.shown = Shown::PICTURE;
-            self.film.count_pixels(&self.gpu, false)?;
-        }
-        self.reset();
-        Ok(())
-    }
-
-    /// Sets a parameter: of the technique by its name, or of a global group as `render.NAME` or `film.NAME`. On error the
-    /// old value stays.
-    ///
-    /// # Errors
-    /// `UNKNOWN_NAME` listing the names there are; `BAD_VALUE` saying what the parameter takes; `LIMIT` if what the
-    /// technique needs with it does not fit.
-    pub fn set(&mut self, key: &str, value: &str) -> Result<()> {
-        let known = match key.split_once('.') {
-            Some(("film", name)) => {
-                // How the picture is shown does not touch what was accumulated.
-                if self.film_params.set(name, value)? {
-                    return Ok(());
-                }
-                false
-            }
-            Some(("render", name)) => self.render_params.set(name, value)?,
-            _ => self.set_of_technique(key, value)?,
-        };
-        if known {
-            self.reset();
-            return Ok(());
-        }
-        self.technique.info().spec(key).map(|_| ())
-    }
-
-    /// Sets a parameter of the technique, or leaves it where the device has no room for what it needs then. Whether the
-    /// name was known.
-    fn set_of_technique(&mut self, name: &str, value: &str) -> Result<bool> {
-        let before = self.technique.values();
-        let known = self.technique.set(name, value)?;
-        if known && let Err(error) = self.technique.prepare(&self.gpu, self.size()) {
-            if let Some(old) = before.get(name) {
-                self.technique.set(name, &old.as_str().map_or_else(|| old.to_string(), str::to_owned))?;
-                self.technique.prepare(&self.gpu, self.size())?;
-            }
-            return Err(error);
-        }
-        Ok(known)
-    }
-
-    /// All parameter values: `{"technique": {...}, "render": {...}, "film": {...}}`.
-    pub fn parameters(&self) -> serde_json::Value {
-        serde_json::json!({
-            "technique": self.technique.values(),
-            "render": self.render_params.values(),
-            "film": self.film_params.values(),
-        })
-    }
-
-    /// Which settings, as they are now, bias the picture.
-    pub fn biases(&self) -> Vec<Bias> {
-        let of_all = self.render_params.biases().into_iter().filter(|bias| self.technique.obeys(bias.parameter));
-        self.technique.biases().into_iter().chain(of_all).collect()
-    }
-
-    /// Shows a debug view, or `radiance`.
-    ///
-    /// # Errors
-    /// `UNKNOWN_NAME` listing the views there are; `LIMIT` where there is no room for what it counts.
-    pub fn set_view(&mut self, name: &str) -> Result<()> {
-        let own = self.technique.info().views;
-        let shown = Shown::find(name, own)?;
-        self.film.count_pixels(&self.gpu, shown.view(own).counts)?;
-        self.shown = shown;
-        self.restart_film = true;
-        Ok(())
-    }
-
-    /// The view that is shown.
-    fn view(&self) -> &'static View {
-        self.shown.view(self.technique.info().views)
-    }
-
-    /// How its values become colours: in the range that `film` asks for, or that settings and scene give, or its own.
-    fn scale(&self) -> Scale {
-        let Scale::Number { unit, mut low, mut high, is_logarithmic } = self.view().scale else {
-            return self.view().scale;
-        };
-        if self.film_params.range_low < self.film_params.range_high {
-            (low, high) = (self.film_params.range_low, self.film_params.range_high);
-        } else if self.shown.is_depth() {
-            high = 4.0 * self.scene_radius();
-        } else if let Some(highest) = self.technique.highest(self.view().name) {
-            high = highest;
-        }
-        // Equal ratios have no beginning at 0.
-        if is_logarithmic {
-            low = low.max(1e-6 * high.abs());
-        }
-        Scale::Number { unit, low, high, is_logarithmic }
-    }
-
-    /// What the colours of the view mean, as [`legend_json`].
-    pub fn legend(&self) -> serde_json::Value {
-        legend_json(self.view(), self.scale(), self.film_params.color_map)
-    }
-
-    /// Moves the camera. The film starts again; the technique keeps its history and reprojects it.
-    pub fn set_camera(&mut self, camera: &Camera) {
-        self.camera = camera.clone();
-        self.followed = None;
-        self.restart_film = true;
-    }
-
     /// Gives the environment other texels, for one that is streamed live. Frames go on being accumulated, and techniques
     /// keep their history. With `render.environment_sampling` at `pyramid` nothing else is needed; at `alias` the next
     /// frame waits for a table that the CPU builds.
@@ -414,76 +252,6 @@ impl Renderer {
             environment.build_alias();
             self.gpu_scene.update_environment(&self.gpu, environment);
         }
-    }
-
-    /// Looks through camera `index` of the scene, and moves with it. From another camera this is a cut: history is dropped.
-    ///
-    /// # Errors
-    /// `UNKNOWN_NAME` listing the cameras there are.
-    pub fn follow_camera(&mut self, index: usize) -> Result<()> {
-        let Some(camera) = self.stage.camera(&self.scene, index).filter(|_| index < self.scene.cameras.len()) else {
-            return Err(Error::Unknown {
-                kind: "camera",
-                name: index.to_string(),
-                known: (0..self.scene.cameras.len()).map(|i| i.to_string()).collect::<Vec<_>>().join(", "),
-            });
-        };
-        if self.followed != Some(index) {
-            self.previous_camera = None;
-            self.has_history = false;
-        }
-        self.camera = camera;
-        self.followed = Some(index);
-        self.restart_film = true;
-        Ok(())
-    }
-
-    /// Plays another animation of the scene, by name or index, from the moment that time is at.
-    ///
-    /// # Errors
-    /// `UNKNOWN_NAME` listing the animations there are.
-    pub fn set_animation(&mut self, name: &str) -> Result<()> {
-        self.clip = self.scene.rig.find_clip(name)?;
-        self.set_time(self.time);
-        Ok(())
-    }
-
-    /// Index of the animation that is played.
-    pub fn animation(&self) -> usize {
-        self.clip
-    }
-
-    /// Goes to a moment, in seconds: the next frame shows it. The film starts again; the technique keeps its history and
-    /// reprojects it. A reset comes back to this moment. Times that are not finite are ignored.
-    pub fn set_time(&mut self, seconds: f64) {
-        if seconds.is_finite() {
-            (self.time, self.start_time, self.time_was_set) = (seconds, seconds, true);
-            self.restart_film = true;
-        }
-    }
-
-    /// The moment that the last frame showed, or that [`Renderer::set_time`] asks the next one for.
-    pub fn time(&self) -> f64 {
-        self.time
-    }
-
-    /// Sets how fast time runs while it does: 1 is a 60th of a second a frame, negative is backwards.
-    pub fn set_speed(&mut self, speed: f64) {
-        if speed.is_finite() {
-            self.speed = speed;
-        }
-    }
-
-    /// Sets the seed of all random numbers and starts again.
-    pub fn set_seed(&mut self, seed: u32) {
-        self.seed = seed;
-        self.reset();
-    }
-
-    /// Whether frames are averaged. On, time stands still where it is; off, it runs, and each frame is shown alone.
-    pub fn set_accumulate(&mut self, accumulate: bool) {
-        self.accumulate = accumulate;
-        self.restart_film = true;
     }
 
     /// Starts again: frame 0, the moment last set (0 at first), no history, an empty film.
@@ -754,128 +522,6 @@ impl Renderer {
             previous_environment_turn: self.environment_turn(self.previous_time),
             previous_top_level: self.gpu_scene.previous_top_level(),
             instance_count: self.gpu_scene.instance_count(),
-        }
-    }
-
-    /// Waits for the device. Like all reads it borrows nothing, so frames may be rendered while it is pending.
-    ///
-    /// # Errors
-    /// `DEVICE` for an error it has reported.
-    pub fn wait(&self) -> impl Future<Output = Result<()>> + use<> {
-        let gpu = self.gpu.clone();
-        async move { gpu.wait().await }
-    }
-
-    /// The accumulated picture: linear Rec. 709 radiance.
-    ///
-    /// # Errors
-    /// `DEVICE` if it cannot be read back.
-    pub fn read_image(&self) -> impl Future<Output = Result<Image>> + use<> {
-        let (gpu, accumulation, size) = (self.gpu.clone(), self.film.accumulation.clone(), self.size());
-        async move {
-            let bytes = gpu.read_buffer(&accumulation, accumulation.size()).await?;
-            let pixels = bytes
-                .chunks_exact(16)
-                .take(size.x as usize * size.y as usize)
-                .map(|pixel| {
-                    let [r, g, b, count]: [f32; 4] = bytemuck::pod_read_unaligned(pixel);
-                    [r, g, b].map(|c| c / count.max(1.0))
-                })
-                .collect();
-            Ok(Image { width: size.x, height: size.y, pixels })
-        }
-    }
-
-    /// The picture as it is displayed: sRGB RGBA8, row-major from the top.
-    ///
-    /// # Errors
-    /// `DEVICE` if it cannot be read back.
-    pub fn read_display(&mut self) -> impl Future<Output = Result<Vec<u8>>> + use<> {
-        let rendered = self.render_display();
-        let (gpu, display, size) = (self.gpu.clone(), self.film.display.clone(), self.size());
-        async move {
-            rendered?;
-            gpu.read_buffer(&display, u64::from(size.x) * u64::from(size.y) * 4).await
-        }
-    }
-
-    /// Albedo, normal and depth of the last frame's primary hits.
-    ///
-    /// # Errors
-    /// `DEVICE` if they cannot be read back.
-    pub fn read_auxiliary(&self) -> impl Future<Output = Result<Auxiliary>> + use<> {
-        let read = self.read_surfaces();
-        async move {
-            let bytes = read.await?;
-            let mut texels = bytes.chunks_exact(16).map(bytemuck::pod_read_unaligned::<[f32; 4]>);
-            let pixels = bytes.len() / 48;
-            let (mut albedo, mut depth) = (Vec::with_capacity(pixels), Vec::with_capacity(pixels));
-            for [r, g, b, distance] in texels.by_ref().take(pixels) {
-                albedo.push([r, g, b]);
-                depth.push(distance);
-            }
-            let normal = texels.by_ref().take(pixels).map(|[x, y, z, _]| [x, y, z]).collect();
-            Ok(Auxiliary { albedo, normal, depth, motion: texels.map(|[x, y, ..]| [x, y]).collect() })
-        }
-    }
-
-    /// What [`Renderer::read_auxiliary`] reads, as it lies on the device: four `f32` a pixel, first albedo and depth of all pixels, then
-    /// normals, then motion, each row-major from the top.
-    ///
-    /// # Errors
-    /// `DEVICE` if they cannot be read back.
-    pub fn read_surfaces(&self) -> impl Future<Output = Result<Vec<u8>>> + use<> {
-        let recorded = self.record_first_surfaces();
-        let gpu = self.gpu.clone();
-        let textures = [&self.albedo_depth, &self.normal, &self.motion].map(|view| view.texture().clone());
-        async move {
-            recorded?;
-            let mut bytes = Vec::new();
-            for texture in &textures {
-                bytes.extend(gpu.read_texture(texture, 16).await?);
-            }
-            Ok(bytes)
-        }
-    }
-
-    /// Has albedo, normal, depth and motion of the last frame's primary hits written.
-    fn record_first_surfaces(&self) -> Result<()> {
-        let mut recorder = Recorder::new(&self.gpu, None);
-        self.gpu_scene.share(&mut recorder);
-        self.render_params.specialise(&mut recorder.features);
-        recorder.share("frame", &self.frame_uniform);
-        recorder.share("visibility", &self.visibility[(self.frame_index.wrapping_sub(1) & 1) as usize]);
-        record_auxiliary(&mut recorder, [&self.albedo_depth, &self.normal, &self.motion], self.size())?;
-        recorder.submit();
-        Ok(())
-    }
-
-    /// Rays of the last frame, and what was left out of the film.
-    ///
-    /// # Errors
-    /// `DEVICE` if it cannot be read back.
-    pub fn counters(&self) -> impl Future<Output = Result<FrameCounters>> + use<> {
-        let (gpu, counters) = (self.gpu.clone(), self.film.counters.clone());
-        async move {
-            let bytes = gpu.read_buffer(&counters, std::mem::size_of::<Counters>() as u64).await?;
-            let counters: Counters = bytemuck::pod_read_unaligned(&bytes);
-            Ok(FrameCounters { rays: counters.rays.into(), nan: counters.nan.into(), inf: counters.infinite.into() })
-        }
-    }
-
-    /// GPU time of each pass of the last frame, those of its display included if it was displayed; empty where the
-    /// device cannot time.
-    ///
-    /// # Errors
-    /// `DEVICE` if they cannot be read back.
-    pub fn pass_times(&self) -> impl Future<Output = Result<Vec<PassTime>>> + use<> {
-        let (gpu, timers) = (self.gpu.clone(), [self.timer.clone(), self.display_timer.clone()]);
-        async move {
-            let mut times = Vec::new();
-            for timer in timers.iter().flatten() {
-                times.extend(timer.read(&gpu).await?);
-            }
-            Ok(times)
         }
     }
 }
