@@ -57,6 +57,9 @@ impl Drop for GpuScene {
     fn drop(&mut self) {
         self.walked.destroy();
         self.lights.destroy();
+        for records in [&self.attributes, &self.materials, &self.material_extensions, &self.instances] {
+            records.destroy();
+        }
         for texture in self.textures.iter().chain([&self.environment_radiance, &self.environment_alias]) {
             texture.texture().destroy();
         }

@@ -273,7 +273,7 @@ impl Renderer {
             return Ok(());
         }
         let mut film = Film::new(&self.gpu, size)?;
-        film.count_pixels(&self.gpu, self.view().counts)?;
+        film.count_pixels(&self.gpu, self.view().counts())?;
         self.technique.prepare(&self.gpu, size)?;
         self.film = film;
         self.visibility = visibility_textures(&self.gpu, size);
@@ -388,7 +388,7 @@ impl Renderer {
         self.film.prepare(&self.gpu, &self.film_params, self.shown.of_film(self.technique.info().views), self.scale());
 
         let restart = self.restarts_film();
-        let counts = self.view().counts;
+        let view = self.view();
         let parity = (self.frame_index & 1) as usize;
         if let Some(timer) = &mut self.display_timer {
             timer.clear();
@@ -400,7 +400,7 @@ impl Renderer {
         self.film.clear_counters(&mut recorder, restart);
         self.gpu_scene.share(&mut recorder);
         self.render_params.specialise(&mut recorder.features);
-        recorder.features.counts_pixels = counts;
+        recorder.features.counts_pixels = view.counts();
         self.film.share(&mut recorder);
         recorder.share("frame", &self.frame_uniform);
         if let Some(inspector) = &self.inspector {
@@ -412,12 +412,12 @@ impl Renderer {
         let pass = recorder.pass(&table::SCENE_VISIBILITY).inspected_by(&table::SCENE_INSPECT);
         pass.bind("visibility_out", &self.visibility[parity]).dispatch_over(size)?;
         recorder.illustrate(&table::SCENE_SEEN, &[], size)?;
-        if self.shown.runs_technique() {
+        if view.runs_technique() {
             self.technique.record(&mut recorder, size)?;
         } else {
             record_auxiliary(&mut recorder, [&self.albedo_depth, &self.normal, &self.motion], size)?;
         }
-        if self.shown.is_drawn_by_film(self.technique.info().views) {
+        if view.is_drawn_by_film() {
             recorder
                 .pass(&table::FILM_VIEW)
                 .bind("albedo_depth", &self.albedo_depth)
@@ -446,7 +446,7 @@ impl Renderer {
         self.restart_film = false;
         self.previous_camera = Some(self.camera.clone());
         // Views of the surface run no technique, and leave its history as old as it was.
-        self.has_history = self.shown.runs_technique();
+        self.has_history = self.view().runs_technique();
         self.frame_index = self.frame_index.wrapping_add(1);
         self.gpu.check()
     }

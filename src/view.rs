@@ -12,8 +12,23 @@ pub struct View {
     pub meaning: &'static str,
     /// How it is shown.
     pub scale: Scale,
-    /// Whether passes have to count by the pixel for it, which costs them a little.
-    pub counts: bool,
+    /// Who makes it.
+    pub source: Source,
+}
+
+/// Who makes a view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Source {
+    /// The technique's passes.
+    Technique,
+    /// `film/view`, of the first surface that each pixel sees; no technique has to run.
+    Surface,
+    /// `film/view`, of what all passes count by the pixel, which costs them a little.
+    Counts,
+    /// The same, of the neighbours that a technique rejects: a view of its own.
+    Rejected,
+    /// `film/accumulate`, which finds what is not finite.
+    Film,
 }
 
 /// How the values of a view become colours.
@@ -39,71 +54,87 @@ pub enum Scale {
 impl View {
     /// One that shows radiance.
     pub const fn radiance(name: &'static str, meaning: &'static str) -> Self {
-        View { name, meaning, scale: Scale::Radiance, counts: false }
+        View { name, meaning, scale: Scale::Radiance, source: Source::Technique }
     }
 
     /// One that shows colours with a meaning of their own.
     pub const fn colors(name: &'static str, meaning: &'static str) -> Self {
-        View { name, meaning, scale: Scale::Colors, counts: false }
+        View { name, meaning, scale: Scale::Colors, source: Source::Technique }
     }
 
     /// One of a number.
     pub const fn number(name: &'static str, meaning: &'static str, unit: &'static str, range: [f32; 2]) -> Self {
         let [low, high] = range;
-        View { name, meaning, scale: Scale::Number { unit, low, high, is_logarithmic: false }, counts: false }
+        View {
+            name,
+            meaning,
+            scale: Scale::Number { unit, low, high, is_logarithmic: false },
+            source: Source::Technique,
+        }
     }
 
     /// One of a number that spans orders of magnitude.
     pub const fn magnitude(name: &'static str, meaning: &'static str, unit: &'static str, range: [f32; 2]) -> Self {
         let [low, high] = range;
-        View { name, meaning, scale: Scale::Number { unit, low, high, is_logarithmic: true }, counts: false }
+        View {
+            name,
+            meaning,
+            scale: Scale::Number { unit, low, high, is_logarithmic: true },
+            source: Source::Technique,
+        }
     }
 
-    /// One of what passes count by the pixel.
-    pub const fn count(name: &'static str, meaning: &'static str, unit: &'static str, high: f32) -> Self {
-        View { counts: true, ..View::number(name, meaning, unit, [0.0, high]) }
+    /// The same view, made by `source`.
+    pub const fn by(self, source: Source) -> Self {
+        View { source, ..self }
+    }
+
+    /// Whether the technique has to run for it.
+    pub fn runs_technique(&self) -> bool {
+        self.source != Source::Surface
+    }
+
+    /// Whether `film/view` draws it.
+    pub fn is_drawn_by_film(&self) -> bool {
+        matches!(self.source, Source::Surface | Source::Counts | Source::Rejected)
+    }
+
+    /// Whether its range is how far the scene goes.
+    pub fn is_depth(&self) -> bool {
+        self.name == DEPTH.name
+    }
+
+    /// Whether passes have to count by the pixel for it.
+    pub fn counts(&self) -> bool {
+        matches!(self.source, Source::Counts | Source::Rejected)
     }
 }
+
+/// How far the first surface is; its range is the scene's.
+const DEPTH: View =
+    View::number("depth", "Distance along the view axis; 0 where there is no surface.", "metres", [0.0, 1.0])
+        .by(Source::Surface);
 
 /// Debug views that every technique has; the first is the picture itself. `shaders/film/film.wgsl` numbers them.
 pub const COMMON_VIEWS: &[View] = &[
     View::radiance("radiance", "The picture itself."),
-    View::colors("albedo", "Base colour of the surface, linear."),
-    View::colors("normal", "Shading normal in world space: x, y and z from −1 to 1 as red, green and blue."),
-    View::number("depth", "Distance along the view axis; 0 where there is no surface.", "metres", [0.0, 1.0]),
+    View::colors("albedo", "Base colour of the surface, linear.").by(Source::Surface),
+    View::colors("normal", "Shading normal in world space: x, y and z from −1 to 1 as red, green and blue.").by(Source::Surface),
+    DEPTH,
     View::colors(
         "motion",
         "How far what is seen has moved in the picture: grey at rest, redder to the right, greener down; full at 16 pixels.",
-    ),
-    View::count("rays", "Rays that the technique's passes trace for the pixel in a frame.", "rays", 32.0),
-    View {
-        counts: true,
-        ..View::magnitude(
-            "BVH steps",
-            "Nodes of the BVH, of four boxes each, that these rays visit.",
-            "nodes",
-            [1.0, 1024.0],
-        )
-    },
-    View::number(
-        "not finite",
-        "The share of frames in which the pixel is no number, or infinite.",
-        "of frames",
-        [0.0, 1.0],
-    ),
+    )
+    .by(Source::Surface),
+    View::number("rays", "Rays traced for the pixel in a frame, the camera's among them.", "rays", [0.0, 32.0]).by(Source::Counts),
+    View::magnitude("BVH steps", "Nodes of the BVH, of four boxes each, that these rays visit.", "nodes", [1.0, 1024.0])
+        .by(Source::Counts),
+    View::number("not finite", "The share of frames in which the pixel is no number, or infinite.", "of frames", [0.0, 1.0])
+        .by(Source::Film),
 ];
 
-/// The common view that `film/accumulate` makes, for it finds what is not finite.
-const NOT_FINITE: u32 = 7;
-
-/// The view of rejected neighbours, in the film's numbers: a technique that has any lists it, but it is counted as rays are.
+/// The view of rejected neighbours, in the film's numbers.
 const REJECTED_NEIGHBORS: u32 = COMMON_VIEWS.len() as u32;
-
-/// The common views that show the first surface, for which no technique has to run.
-const OF_SURFACE: std::ops::RangeInclusive<usize> = 1..=4;
-
-/// The one of them whose range is the scene's.
-const DEPTH: usize = 3;
 
 /// Which view is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -139,16 +170,6 @@ impl Shown {
         }
     }
 
-    /// Whether the technique has to run for it.
-    pub fn runs_technique(self) -> bool {
-        !matches!(self, Shown::Common(index) if OF_SURFACE.contains(&index))
-    }
-
-    /// Whether its range is how far the scene goes.
-    pub fn is_depth(self) -> bool {
-        self == Shown::Common(DEPTH)
-    }
-
     /// `Frame::view`: 0, or the technique's own view from 1 on.
     pub fn of_technique(self) -> u32 {
         match self {
@@ -157,18 +178,13 @@ impl Shown {
         }
     }
 
-    /// `FilmUniforms::view`: 0, or what the film draws, of a technique's `own` views what is counted.
+    /// `FilmUniforms::view`: 0, or what the film makes.
     pub fn of_film(self, own: &'static [View]) -> u32 {
         match self {
             Shown::Common(index) => index as u32,
-            Shown::Own(_) if self.view(own).counts => REJECTED_NEIGHBORS,
+            Shown::Own(_) if self.view(own).source == Source::Rejected => REJECTED_NEIGHBORS,
             Shown::Own(_) => 0,
         }
-    }
-
-    /// Whether `film/view` draws it.
-    pub fn is_drawn_by_film(self, own: &'static [View]) -> bool {
-        ![0, NOT_FINITE].contains(&self.of_film(own))
     }
 }
 

@@ -287,7 +287,7 @@ fn shaders_number_views_as_declared() {
     film.insert("REJECTED_NEIGHBOURS".to_owned(), COMMON_VIEWS.len());
     assert_eq!(numbered("film"), film);
     for info in techniques::ALL {
-        let drawn = info.views.split(|view| view.counts).next().expect("a slice");
+        let drawn = info.views.split(|view| view.counts()).next().expect("a slice");
         assert_eq!(numbered(&format!("techniques/{}", info.id)), expected(drawn), "{}", info.id);
     }
 }

@@ -105,7 +105,7 @@ test('every public member of the classes and every event is in the API reference
   assert.ok(viewer.length > 40 && viewer.includes('setParam') && viewer.includes('suspended'), viewer.join(' '));
   for (const name of viewer) assert.ok(ids.includes(`restirviewer-${name.toLowerCase()}`), `RestirViewer.${name}`);
   assert.ok(ids.includes('restirviewerelement-viewer'));
-  const events = [...bodyOf('viewer.d.ts', 'export interface ViewerEventMap ').matchAll(/^ {4}'?([\w-]+)'?: CustomEvent/gm)].map(([, name]) => name);
+  const events = [...bodyOf('viewer-events.d.ts', 'export interface ViewerEventMap ').matchAll(/^ {4}'?([\w-]+)'?: CustomEvent/gm)].map(([, name]) => name);
   assert.ok(events.length >= 8);
   for (const name of events) assert.ok(reference.includes(`<td><code>${name}</code></td>`), name);
   assert.match(reference, /<code>setting\?<\/code>/, 'what may be left out says so');

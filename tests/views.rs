@@ -182,6 +182,22 @@ fn numbers_get_the_colours_of_the_legend() {
     }
 }
 
+/// By magnitude there is nothing below 0: a range that ends there is the view's own.
+#[test]
+fn a_range_below_zero_is_no_range_of_magnitudes() {
+    let mut renderer = renderer(&gpu(), builtin("cornell"), SIZE, "restir-di", &[]);
+    renderer.set_view("contribution weight").expect("a view");
+    let own = renderer.legend();
+    for [low, high] in [["-5", "-1"], ["-5", "0"]] {
+        renderer.set("film.range_low", low).expect("a range");
+        renderer.set("film.range_high", high).expect("a range");
+        assert_eq!(renderer.legend(), own, "{low} to {high}");
+    }
+    renderer.set("film.range_high", "8").expect("a range");
+    let [low, high] = ["low", "high"].map(|end| renderer.legend()[end].as_f64().expect("an end"));
+    assert!(0.0 < low && low < high && high == 8.0, "{low} to {high}");
+}
+
 /// Every number within its range's ends is told apart: a view all of one colour says nothing.
 #[test]
 fn ranges_suit_what_is_seen() {

@@ -177,6 +177,8 @@ class App {
     this.showSources(scene);
     this.showContents(scene.source, contents);
     this.showTime(report);
+    // The range of depths is the scene's.
+    void this.legend.update();
     this.address.chosen();
   }
 
@@ -366,8 +368,8 @@ class App {
       for (const each of this.viewers()) void each.reset();
     });
     byId('timing', HTMLDetailsElement).addEventListener('toggle', () => this.stats && showTiming(this.stats));
-    button('save').addEventListener('click', () => void this.save('png', 'png'));
-    button('save-exr').addEventListener('click', () => void this.save('image/x-exr', 'exr'));
+    button('save').addEventListener('click', () => void this.save('png'));
+    button('save-exr').addEventListener('click', () => void this.save('exr'));
     button('copy-link').addEventListener('click', () => void this.copy(button('copy-link'), this.link()));
     button('copy-command').addEventListener('click', () => void this.copy(button('copy-command'), this.command()));
     const help = byId('help', HTMLDialogElement);
@@ -436,10 +438,9 @@ class App {
     button('fold').setAttribute('aria-expanded', String(!settings.hidden));
   }
 
-  private async save(type: 'png' | 'image/x-exr', ending: string): Promise<void> {
+  private async save(type: 'png' | 'exr'): Promise<void> {
     const picture = await this.view.capture({ type }).catch(() => undefined);
-    if (!picture) return;
-    save(picture, `${this.fileName()}.${ending}`);
+    if (picture) save(picture, `${this.fileName()}.${type}`);
   }
 
   /** What pictures are called, without an ending. */

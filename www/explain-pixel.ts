@@ -80,7 +80,7 @@ export function explainPixel(seen: Inspection): string[] {
   const words: string[] = [];
   if (luminance(seen.surface.emission) > 0) words.push('The surface shines itself; what it reflects comes on top.');
   const last = lastResult(seen);
-  if (!last) words.push('There are no notes on what was sampled: RIS and ReSTIR DI keep them, while the view is one of theirs.');
+  if (!last) words.push('There are no notes on what was sampled: a path tracer keeps none, nor does a view of the surface.');
   else words.push(...whyWords(seen, last));
   return [...words, candidateWords(seen), historyWords(seen), ...neighbourWords(seen)].filter((text) => text !== undefined);
 }

@@ -6,29 +6,33 @@ export interface ExrPicture {
   height: number;
   /** Linear Rec. 709, three numbers a pixel: channels `R`, `G`, `B`. */
   pixels: Float32Array;
-  /** Four numbers a pixel, first of all pixels albedo and depth (metres), then normals, then motion (pixels). */
-  surfaces: Float32Array;
+  /** Four numbers a pixel: linear albedo, and depth in metres. */
+  albedoDepth: Float32Array;
+  /** Four numbers a pixel, of which the first three are the normal in world space. */
+  normal: Float32Array;
+  /** Four numbers a pixel, of which the first two are the motion in pixels. */
+  motion: Float32Array;
   /** Attributes of the file, as text. */
   attributes: Record<string, string>;
 }
 
-/** Where a channel is: in which array, after how many numbers of each pixel, which of how many numbers of a pixel. */
-type Channel = [name: string, array: 'pixels' | 'surfaces', before: number, at: number, of: number];
+/** Where a channel is: in which array, and which of how many numbers of a pixel. */
+type Channel = [name: string, array: 'pixels' | 'albedoDepth' | 'normal' | 'motion', at: number, of: number];
 
 /** In the order of their names, as the format wants. */
 const channels: Channel[] = [
-  ['B', 'pixels', 0, 2, 3],
-  ['G', 'pixels', 0, 1, 3],
-  ['R', 'pixels', 0, 0, 3],
-  ['albedo.B', 'surfaces', 0, 2, 4],
-  ['albedo.G', 'surfaces', 0, 1, 4],
-  ['albedo.R', 'surfaces', 0, 0, 4],
-  ['depth.Z', 'surfaces', 0, 3, 4],
-  ['motion.X', 'surfaces', 8, 0, 4],
-  ['motion.Y', 'surfaces', 8, 1, 4],
-  ['normal.X', 'surfaces', 4, 0, 4],
-  ['normal.Y', 'surfaces', 4, 1, 4],
-  ['normal.Z', 'surfaces', 4, 2, 4],
+  ['B', 'pixels', 2, 3],
+  ['G', 'pixels', 1, 3],
+  ['R', 'pixels', 0, 3],
+  ['albedo.B', 'albedoDepth', 2, 4],
+  ['albedo.G', 'albedoDepth', 1, 4],
+  ['albedo.R', 'albedoDepth', 0, 4],
+  ['depth.Z', 'albedoDepth', 3, 4],
+  ['motion.X', 'motion', 0, 4],
+  ['motion.Y', 'motion', 1, 4],
+  ['normal.X', 'normal', 0, 4],
+  ['normal.Y', 'normal', 1, 4],
+  ['normal.Z', 'normal', 2, 4],
 ];
 
 /** Rows of a chunk of ZIP compression, and its number; the number of 32-bit float. */
@@ -92,9 +96,9 @@ function rows(picture: ExrPicture, first: number): Bytes {
   const values = new Float32Array(count * channels.length * width);
   let to = 0;
   for (let row = first; row < first + count; row++) {
-    for (const [, array, before, at, of] of channels) {
+    for (const [, array, at, of] of channels) {
       const numbers = picture[array];
-      let from = before * width * height + row * width * of + at;
+      let from = row * width * of + at;
       for (let x = 0; x < width; x++, from += of) values[to++] = numbers[from] ?? 0;
     }
   }

@@ -6,15 +6,21 @@ import type { RestirViewer } from './viewer.js';
 /** The share of pixels that may lie beyond either end after a fit. */
 const beyond = 0.01;
 
+/** What the parameters of the range take. */
+const furthest = 1e9;
+
 /** A number with four figures, as people and parameters read it. */
-const short = (value: number) => String(Number(value.toPrecision(4)));
+const fourFigures = (value: number) => String(Number(value.toPrecision(4)));
 
 /** The ends of the numbers of a picture, those of few pixels left out; undefined where all are alike. */
 export function fittedRange(values: Float32Array, logarithmic: boolean): [number, number] | undefined {
   const sorted = values.filter((value) => Number.isFinite(value) && (!logarithmic || value > 0)).sort();
   const at = (share: number) => sorted[Math.round(share * (sorted.length - 1))] ?? 0;
-  const [low, high] = [Number(short(at(beyond))), Number(short(at(1 - beyond)))];
-  return low < high ? [low, high] : undefined;
+  const ends = (share: number) => [at(share), at(1 - share)].map((value) => Number(fourFigures(Math.min(Math.max(value, -furthest), furthest)))) as [number, number];
+  // Where nearly all are alike, the few others count.
+  const [low, high] = ends(beyond);
+  const [least, most] = ends(0);
+  return low < high ? [low, high] : least < most ? [least, most] : undefined;
 }
 
 export class Legend {
@@ -43,10 +49,10 @@ export class Legend {
     if (!colors) return;
     const bar = byId('legend-bar', HTMLElement);
     bar.style.background = `linear-gradient(to right, ${colors.join(', ')})`;
-    bar.ariaLabel = `Colours from ${short(low)} to ${short(high)} ${unit}${logarithmic ? ', by magnitude' : ''}`;
-    byId('legend-low', HTMLElement).textContent = short(low);
+    bar.ariaLabel = `Colours from ${fourFigures(low)} to ${fourFigures(high)} ${unit}${logarithmic ? ', by magnitude' : ''}`;
+    byId('legend-low', HTMLElement).textContent = fourFigures(low);
     byId('legend-unit', HTMLElement).textContent = logarithmic ? `${unit}, by magnitude` : unit;
-    byId('legend-high', HTMLElement).textContent = short(high);
+    byId('legend-high', HTMLElement).textContent = fourFigures(high);
     const { values } = viewer.settings;
     byId('legend-own', HTMLButtonElement).disabled = !values.has('film.range_low') && !values.has('film.range_high');
   }

@@ -11,7 +11,7 @@ const number = (id: string) => {
 };
 
 /** What the pictures of an animation are put into. */
-interface Film {
+interface Sequence {
   ending: string;
   /** Renders the next moment, in seconds, of so many averaged frames, and puts it in. */
   add(moment: number, samples: number): Promise<void>;
@@ -23,7 +23,7 @@ interface Film {
 // What makes files is fetched when it is used, for few visitors do.
 
 /** Numbered PNG files called `name`. */
-async function archiveOf(view: RestirViewer, name: string): Promise<Film> {
+async function archiveOf(view: RestirViewer, name: string): Promise<Sequence> {
   const { zip } = await import('./zip.js');
   const entries: { name: string; bytes: Uint8Array<ArrayBuffer> }[] = [];
   const add = async (moment: number, samples: number) => {
@@ -34,7 +34,7 @@ async function archiveOf(view: RestirViewer, name: string): Promise<Film> {
 }
 
 /** A video of `rate` frames a second. */
-async function videoOf(view: RestirViewer, rate: number): Promise<Film> {
+async function videoOf(view: RestirViewer, rate: number): Promise<Sequence> {
   const { MomentVideo } = await import('./moment-video.js');
   const video = await MomentVideo.of(...view.size, rate);
   const add = async (moment: number, samples: number) => video.add(await view.renderAt(moment, samples, { type: 'rgba' }));
@@ -56,7 +56,7 @@ export class Recording {
     private readonly name: () => string,
   ) {
     this.videoButton.addEventListener('click', () => (this.stopVideo ? this.stopVideo() : void this.recordVideo()));
-    const record = (film: (rate: number) => Promise<Film>) => (event: Event) =>
+    const record = (film: (rate: number) => Promise<Sequence>) => (event: Event) =>
       this.pictures ? this.pictures.abort() : void this.recordMoments(event.currentTarget as HTMLButtonElement, film);
     this.picturesButton.addEventListener('click', record(() => archiveOf(view, this.name())));
     this.exactButton.addEventListener('click', record((rate) => videoOf(view, rate)));
@@ -107,7 +107,7 @@ export class Recording {
   }
 
   /** Renders an animation's pictures at their moments, and saves them as one file; `button` cancels it meanwhile. */
-  private async recordMoments(button: HTMLButtonElement, filmOf: (rate: number) => Promise<Film>): Promise<void> {
+  private async recordMoments(button: HTMLButtonElement, filmOf: (rate: number) => Promise<Sequence>): Promise<void> {
     const { view } = this;
     const [count, rate, samples] = [number('record-count'), number('record-rate'), number('record-samples')];
     if (count === undefined || rate === undefined || samples === undefined) {
@@ -122,11 +122,11 @@ export class Recording {
     const start = view.settings.time;
     const { scene } = view;
     const { size } = view.settings;
-    let film: Film | undefined;
+    let film: Sequence | undefined;
     try {
-      film = await filmOf(rate);
-      // All pictures are of one size.
+      // All pictures are of one size, and so is what they are put into.
       await view.setSize(view.size);
+      film = await filmOf(rate);
       for (let at = 0; at < count && !signal.aborted; at++) {
         if (view.scene !== scene || view.loading) throw { code: 'CANCELLED', message: 'Another scene was chosen: no pictures were saved.' };
         this.words.textContent = `Picture ${at + 1} of ${count}`;

@@ -13,7 +13,7 @@ const slice = 8;
  * Renders a frame and presents it, and waits for the device. Pipelines that it waits for are asked for one by one, and the page draws and
  * listens meanwhile; `making` is told how many of how many the device has compiled, also where there are none.
  */
-async function renderFrame(viewer: Viewer, making: (made: number, all: number) => void): Promise<void> {
+export async function renderFrame(viewer: Viewer, making: (made: number, all: number) => void = () => undefined): Promise<void> {
   let began = performance.now();
   const all = viewer.begin();
   making(0, all);

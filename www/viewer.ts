@@ -11,78 +11,19 @@ import { type Progress, SceneLoader } from './loader.js';
 import { type Picture, errorsOf } from './measure.js';
 import { RestirError, toFailure } from './messages.js';
 import { pixelAt } from './overlay.js';
+import { pngOf, readChannels, readDisplay } from './pictures.js';
 import { Viewer } from './pkg/restir.js';
 import type { Choice, Contents, SceneSource, Surroundings } from './protocol.js';
-import { RenderLoop } from './render-loop.js';
+import { RenderLoop, renderFrame } from './render-loop.js';
 import { Resolution, defaultBudget, longestSide } from './resolution.js';
-import type { Stage } from './stages.js';
 import { type Settings, defaultSettings, writeQuery } from './url-state.js';
+import type { Change, LoadOptions, Scene, ViewerEventMap } from './viewer-events.js';
 import { compileWasm, startWasm } from './wasm.js';
 
-export type { BiasNote, Camera, Choice, Contents, Description, DissectedPass, Errors, Failure, Inspection, Memory, Picture, Pose, SceneReport, Settings, Stage, Stats };
+export type { BiasNote, Camera, Choice, Contents, Description, DissectedPass, Errors, Failure, Inspection, Memory, Picture, Pose, SceneReport, Settings, Stats };
+export type { Stage } from './stages.js';
+export type * from './viewer-events.js';
 export { RestirError };
-
-/** One frame. */
-export interface Sample {
-  /** Frames in the picture: 1 where they are not averaged. */
-  count: number;
-  /** From the frame's first command to an idle device. */
-  milliseconds: number;
-  /** Rendered pixels. */
-  width: number;
-  height: number;
-  /** Moment of the scene, in seconds. */
-  time: number;
-  /** Whether the picture has all the frames it shall have. */
-  complete: boolean;
-}
-
-/** What went wrong. The last good picture stays on the canvas. */
-export interface ViewerFailure extends Failure {
-  /** `name=value` of a setting given to the constructor that was not taken; its default is used instead. */
-  setting?: string;
-  /** The renderer has stopped: after `INTERNAL` only loading the page again helps, else `restore()` may. */
-  stopped?: boolean;
-}
-
-/** What is shown. */
-export interface Scene {
-  source: SceneSource;
-  surroundings: Surroundings | undefined;
-  report: SceneReport;
-  cameras: Camera[];
-  /** Scenes and variants to choose from in a glTF file. */
-  contents: Contents;
-}
-
-/** A value that has changed: of a parameter by its key, or of one of `Settings` by its name. */
-export interface Change {
-  name: string;
-  value: string | number | boolean | undefined;
-}
-
-export interface ViewerEventMap {
-  /**
-   * Which stage a load is in, how far it is as a whole, from 0 to 1, and what it does; at 1 the renderer takes it over, and it cannot be
-   * cancelled any more. `count` tells how many of how many pipelines are compiled. The last stages, `pipelines` and `picture`, end with the
-   * first `sample` after `load`.
-   */
-  progress: CustomEvent<{ stage: Stage; fraction: number; what: string; count?: [done: number, all: number] }>;
-  /** A scene is there; its first picture is about to be rendered. */
-  load: CustomEvent<Scene>;
-  /** After each frame. */
-  sample: CustomEvent<Sample>;
-  /** The camera was moved, by hand or by `setCamera`. */
-  'camera-change': CustomEvent<Camera>;
-  /** Something else that determines the picture was changed. */
-  'param-change': CustomEvent<Change>;
-  /** Something went wrong; the method's promise is rejected, too. */
-  error: CustomEvent<ViewerFailure>;
-  /** The graphics device was lost. Unless `final`, the viewer is about to build everything again. */
-  devicelost: CustomEvent<{ message: string; final: boolean }>;
-  /** The viewer renders again, on another device. */
-  restored: CustomEvent<null>;
-}
 
 export interface RestirViewer {
   addEventListener<Type extends keyof ViewerEventMap>(
@@ -91,21 +32,6 @@ export interface RestirViewer {
     options?: boolean | AddEventListenerOptions,
   ): void;
   addEventListener(type: string, listener: EventListenerOrEventListenerObject | null, options?: boolean | AddEventListenerOptions): void;
-}
-
-/** What a scene opens with. What is left out is the scene's own; `environment` is kept as it is. */
-export interface LoadOptions {
-  /** What of a glTF file to show. */
-  choice?: Choice;
-  /** Index or name among the scene's animations. */
-  animation?: string;
-  /** `sky...`, `white`, or the address of an .hdr or .exr map; null for the scene's own. */
-  environment?: string | null | undefined;
-  /** Index or name among the scene's cameras. */
-  camera?: string;
-  pose?: Pose;
-  /** Seconds. */
-  time?: number;
 }
 
 /** How a scene is seen when it opens; with `values`, all settings. */
@@ -365,7 +291,7 @@ export class RestirViewer extends EventTarget {
     return this.reported(() =>
       this.loop.change(async (viewer) => {
         viewer.inspect(Uint32Array.of(x, y));
-        viewer.render();
+        await renderFrame(viewer);
         const { surface } = JSON.parse((await viewer.inspection()) as string) as Inspection;
         viewer.inspect(Uint32Array.from(this.isInside(this.inspected) ? this.inspected : []));
         if (!surface) return;
@@ -542,16 +468,16 @@ export class RestirViewer extends EventTarget {
   // What is there
 
   /**
-   * The picture as shown: a PNG file, or `ImageData` of sRGB bytes, row-major from the top. Or, as `image/x-exr`, an OpenEXR file with what
+   * The picture as shown: a PNG file, or `ImageData` of sRGB bytes, row-major from the top. Or, as `exr`, an OpenEXR file with what
    * was averaged, linear Rec. 709 radiance, and albedo, normal, depth and motion of what the pixels of the last frame see first, as
    * `restir render` writes it.
    */
   capture(options: { type: 'rgba' }): Promise<ImageData>;
-  capture(options?: { type: 'png' | 'image/x-exr' }): Promise<Blob>;
-  capture({ type = 'png' }: { type?: 'png' | 'rgba' | 'image/x-exr' } = {}): Promise<ImageData | Blob> {
+  capture(options?: { type: 'png' | 'exr' }): Promise<Blob>;
+  capture({ type = 'png' }: { type?: 'png' | 'rgba' | 'exr' } = {}): Promise<ImageData | Blob> {
     return this.reported(async () => {
-      if (type === 'image/x-exr') return this.exr();
-      if (type !== 'png' && type !== 'rgba') throw invalid(`${String(type)} is none of png, rgba, image/x-exr.`);
+      if (type === 'exr') return this.exr();
+      if (type !== 'png' && type !== 'rgba') throw invalid(`${String(type)} is none of png, rgba, exr.`);
       const picture = await this.picture();
       return type === 'rgba' ? picture : pngOf(picture);
     });
@@ -581,8 +507,7 @@ export class RestirViewer extends EventTarget {
         viewer.set_time(seconds);
         viewer.reset();
         for (let frame = 0; frame < frames; frame++) {
-          viewer.render();
-          await viewer.idle();
+          await renderFrame(viewer);
         }
         return this.read(viewer);
       });
@@ -1051,28 +976,15 @@ export class RestirViewer extends EventTarget {
   }
 
   private async exr(): Promise<Blob> {
-    const picture = await this.call(async (viewer) => {
-      const [width, height] = this.rendered;
-      const attributes = {
-        'restir.frames': String(viewer.frames()),
-        'restir.parameters': viewer.parameters(),
-        'restir.seed': String(this.settings.seed),
-        'restir.technique': this.settings.technique,
-        'restir.version': description().version,
-      };
-      const pixels = (await viewer.read_picture()) as Float32Array;
-      const { buffer } = (await viewer.read_surfaces()) as Uint8Array;
-      return { width, height, pixels, surfaces: new Float32Array(buffer), attributes };
-    });
+    const { rendered, settings } = this;
+    const picture = await this.call((viewer) => readChannels(viewer, rendered, settings));
     // Few pictures are saved so: fetched only now.
     const { encodeExr } = await import('./exr.js');
     return encodeExr(picture);
   }
 
-  private async read(viewer: Viewer): Promise<ImageData> {
-    const [width, height] = this.rendered;
-    const bytes = (await viewer.read_display()) as Uint8Array;
-    return new ImageData(Uint8ClampedArray.from(bytes), width, height);
+  private read(viewer: Viewer): Promise<ImageData> {
+    return readDisplay(viewer, this.rendered);
   }
 
   // Losses
@@ -1094,12 +1006,6 @@ export class RestirViewer extends EventTarget {
     this.loop.stop(new RestirError(failure));
     this.emit('error', { ...failure, stopped: true });
   }
-}
-
-function pngOf(picture: ImageData): Promise<Blob> {
-  const canvas = new OffscreenCanvas(picture.width, picture.height);
-  canvas.getContext('2d')?.putImageData(picture, 0, 0);
-  return canvas.convertToBlob({ type: 'image/png' });
 }
 
 const camerasOf = (viewer: Viewer) => JSON.parse(viewer.cameras()) as Camera[];

@@ -16,7 +16,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     var sample = textureLoad(radiance, id.xy, 0).rgb;
     if film.view == VIEW_NOT_FINITE {
-        sample = vec3f(select(1.0, 0.0, all(abs(sample) < vec3f(3.4e38))));
+        sample = vec3f(select(1.0, 0.0, is_finite(sample.r) && is_finite(sample.g) && is_finite(sample.b)));
     }
     if is_nan(sample.r) || is_nan(sample.g) || is_nan(sample.b) {
         atomicAdd(&counters.nan, 1u);

@@ -57,3 +57,7 @@ fn is_nan(x: f32) -> bool {
 fn is_infinite(x: f32) -> bool {
     return (bitcast<u32>(x) & 0x7fffffffu) == 0x7f800000u;
 }
+
+fn is_finite(value: f32) -> bool {
+    return !is_nan(value) && !is_infinite(value);
+}

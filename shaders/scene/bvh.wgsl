@@ -150,7 +150,7 @@ fn safe_inverse(direction: vec3f) -> vec3f {
 
 // The four bytes of a word as numbers, in software over 255: a shift by a vector is done lane by lane there, and this is not.
 // Its rounding takes a quarter of the margin that `bvh_visit` allows for all.
-fn bytes(word: u32) -> vec4f {
+fn unpack_planes(word: u32) -> vec4f {
     if is_software {
         return unpack4x8unorm(word);
     }
@@ -202,18 +202,18 @@ fn bvh_visit(
         bitcast<f32>((grid.w & 0xffu) * 0x800000u), bitcast<f32>((grid.w & 0xff00u) * 0x8000u),
         bitcast<f32>((grid.w & 0xff0000u) * 0x80u)
     ) * inverse;
-    let scaled = select(steps, 255.0 * steps, is_software); // by what `bytes` gives
+    let scaled = select(steps, 255.0 * steps, is_software); // by what `unpack_planes` gives
     let start = (bitcast<vec3f>(grid.xyz) - origin) * inverse;
     let margin = abs(start) * 6e-7 + abs(steps) * 2e-4;
     let near = start - margin;
     let far = start + margin;
     let back = inverse < vec3f(0.0);
-    let enter_x = fma(bytes(select(a.x, a.w, back.x)), vec4f(scaled.x), vec4f(near.x));
-    let enter_y = fma(bytes(select(a.y, b.x, back.y)), vec4f(scaled.y), vec4f(near.y));
-    let enter_z = fma(bytes(select(a.z, b.y, back.z)), vec4f(scaled.z), vec4f(near.z));
-    let leave_x = fma(bytes(select(a.w, a.x, back.x)), vec4f(scaled.x), vec4f(far.x));
-    let leave_y = fma(bytes(select(b.x, a.y, back.y)), vec4f(scaled.y), vec4f(far.y));
-    let leave_z = fma(bytes(select(b.y, a.z, back.z)), vec4f(scaled.z), vec4f(far.z));
+    let enter_x = fma(unpack_planes(select(a.x, a.w, back.x)), vec4f(scaled.x), vec4f(near.x));
+    let enter_y = fma(unpack_planes(select(a.y, b.x, back.y)), vec4f(scaled.y), vec4f(near.y));
+    let enter_z = fma(unpack_planes(select(a.z, b.y, back.z)), vec4f(scaled.z), vec4f(near.z));
+    let leave_x = fma(unpack_planes(select(a.w, a.x, back.x)), vec4f(scaled.x), vec4f(far.x));
+    let leave_y = fma(unpack_planes(select(b.x, a.y, back.y)), vec4f(scaled.y), vec4f(far.y));
+    let leave_z = fma(unpack_planes(select(b.y, a.z, back.z)), vec4f(scaled.z), vec4f(far.z));
     // Above 0, for the bits of positive numbers order as the numbers do.
     let enter = larger(larger(enter_x, enter_y), larger(enter_z, vec4f(1e-37)));
     let leave = smaller(smaller(leave_x, leave_y), smaller(leave_z, vec4f(t_max)));

@@ -1,8 +1,8 @@
-// Records that do not fit in the storage buffers of a stage: each lies in a data texture, texel after texel, row after row
-// (src/gpu/data_texture.rs). A loader reads whole records; what a caller does not use, compilers leave out.
+// Records that do not fit in the storage buffers of a stage, and on software adapters nodes and triangles, too: each lies in a
+// data texture, texel after texel, row after row (src/gpu/data_texture.rs). A loader reads whole records; what a caller does not use, compilers leave out.
 #include "scene/bindings.wgsl"
 
-// Triangles in `triangles`; the others are in `triangles_rest`. As in src/gpu_scene.rs.
+// Triangles in `triangles`; the others are in `triangles_rest`. As in src/gpu_scene/walked.rs.
 const FIRST_TRIANGLES = 2796202u; // 128 MiB of them
 
 const DATA_ROW_BITS = 13u; // texels of a row: 8192

@@ -1,6 +1,6 @@
 // Primary visibility.
 // One invocation: one pixel. Reads the scene. Writes the visibility buffer: (instance, triangle, barycentrics as bits),
-// instance NONE where the ray left the scene.
+// instance NONE where the ray left the scene; and counts rays.
 // Source: Burns and Hunt 2013, "The Visibility Buffer".
 #include "scene/camera.wgsl"
 #include "scene/counters.wgsl"

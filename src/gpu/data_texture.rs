@@ -50,6 +50,11 @@ impl DataTexture {
         self.texture.height() > 1
     }
 
+    /// Frees it at once, rather than when nobody refers to it any more.
+    pub fn destroy(&self) {
+        self.texture.destroy();
+    }
+
     /// A texture for `bytes` bytes.
     fn empty(gpu: &Gpu, label: &str, bytes: usize) -> Result<Self> {
         let texels = (bytes as u64 / TEXEL).max(1);

@@ -117,7 +117,7 @@ impl Recording {
         unmade.len()
     }
 
-    /// Runs what comes before the next pipeline that is not made, and makes that; false where there is none and all has been recorded.
+    /// Runs what comes before the next pipeline that is not made, and makes that; false where there is none and all is encoded.
     /// Compiling may take a second: the device runs the passes before meanwhile.
     pub fn make_pipeline(&mut self, gpu: &Gpu) -> bool {
         while let Some(command) = self.commands.pop_front() {

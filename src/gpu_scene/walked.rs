@@ -44,7 +44,7 @@ impl Walked {
             nodes: gpu.storage_in_slices("the nodes of the BVH", buffered.0, pace).await?,
             triangles: [
                 gpu.storage_in_slices("triangles", first, pace).await?,
-                gpu.storage_in_slices("the triangles after the first 2796202", rest, pace).await?,
+                gpu.storage_in_slices(&format!("the triangles after the first {FIRST_TRIANGLES}"), rest, pace).await?,
             ],
             node_texels: DataTexture::in_slices(gpu, "the nodes of the BVH", textured.0, pace).await?,
             triangle_texels: DataTexture::in_slices(gpu, "triangles", textured.1, pace).await?,
@@ -68,7 +68,7 @@ impl Walked {
             buffer.destroy();
         }
         for texels in [&self.node_texels, &self.triangle_texels] {
-            texels.view.texture().destroy();
+            texels.destroy();
         }
     }
 

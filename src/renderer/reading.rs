@@ -2,7 +2,7 @@
 //! pending.
 
 use super::{Renderer, record_auxiliary};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::Counters;
 use crate::gpu::memory::{Memory, bytes_of};
 use crate::gpu::recorder::{PassTime, Recorder, Timer};
@@ -97,42 +97,38 @@ impl Renderer {
         }
     }
 
-    /// Albedo, normal and depth of the last frame's primary hits.
+    /// Albedo, normal, depth and motion of the last frame's primary hits.
     ///
     /// # Errors
     /// `DEVICE` if they cannot be read back.
     pub fn read_auxiliary(&self) -> impl Future<Output = Result<Auxiliary>> + use<> {
-        let read = self.read_surfaces();
+        let reads = [0, 1, 2].map(|which| self.read_surfaces(which));
         async move {
-            let bytes = read.await?;
-            let mut texels = bytes.chunks_exact(16).map(bytemuck::pod_read_unaligned::<[f32; 4]>);
-            let pixels = bytes.len() / 48;
-            let (mut albedo, mut depth) = (Vec::with_capacity(pixels), Vec::with_capacity(pixels));
-            for [r, g, b, distance] in texels.by_ref().take(pixels) {
-                albedo.push([r, g, b]);
-                depth.push(distance);
+            let [albedo_depth, normal, motion] = reads;
+            let mut out = Auxiliary::default();
+            for [r, g, b, depth] in texels(&albedo_depth.await?) {
+                out.albedo.push([r, g, b]);
+                out.depth.push(depth);
             }
-            let normal = texels.by_ref().take(pixels).map(|[x, y, z, _]| [x, y, z]).collect();
-            Ok(Auxiliary { albedo, normal, depth, motion: texels.map(|[x, y, ..]| [x, y]).collect() })
+            out.normal = texels(&normal.await?).map(|[x, y, z, _]| [x, y, z]).collect();
+            out.motion = texels(&motion.await?).map(|[x, y, ..]| [x, y]).collect();
+            Ok(out)
         }
     }
 
-    /// What [`Renderer::read_auxiliary`] reads, as it lies on the device: four `f32` a pixel, first albedo and depth of all pixels, then
-    /// normals, then motion, each row-major from the top.
+    /// A part of what [`Renderer::read_auxiliary`] reads, as it lies on the device: four `f32` a pixel, row-major from the top; of part 0
+    /// albedo and depth, of 1 normals, of 2 motion.
     ///
     /// # Errors
-    /// `DEVICE` if they cannot be read back.
-    pub fn read_surfaces(&self) -> impl Future<Output = Result<Vec<u8>>> + use<> {
+    /// `BAD_VALUE` for another part, `DEVICE` if it cannot be read back.
+    pub fn read_surfaces(&self, part: usize) -> impl Future<Output = Result<Vec<u8>>> + use<> {
         let recorded = self.record_first_surfaces();
         let gpu = self.gpu.clone();
-        let textures = [&self.albedo_depth, &self.normal, &self.motion].map(|view| view.texture().clone());
+        let texture = [&self.albedo_depth, &self.normal, &self.motion].get(part).map(|view| view.texture().clone());
         async move {
             recorded?;
-            let mut bytes = Vec::new();
-            for texture in &textures {
-                bytes.extend(gpu.read_texture(texture, 16).await?);
-            }
-            Ok(bytes)
+            let texture = texture.ok_or_else(|| Error::bad_value("part", format!("{part} is not 0, 1 or 2")))?;
+            gpu.read_texture(&texture, 16).await
         }
     }
 
@@ -176,4 +172,9 @@ impl Renderer {
             Ok(times)
         }
     }
+}
+
+/// Four numbers of each texel.
+fn texels(bytes: &[u8]) -> impl Iterator<Item = [f32; 4]> {
+    bytes.chunks_exact(16).map(bytemuck::pod_read_unaligned)
 }

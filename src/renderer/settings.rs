@@ -2,7 +2,7 @@
 
 use super::Renderer;
 use crate::error::{Error, Result};
-use crate::params::Params;
+use crate::params::{FilmParams, Params};
 use crate::scene::Camera;
 use crate::techniques::{self, Bias};
 use crate::view::{Scale, Shown, View, legend_json};
@@ -15,11 +15,11 @@ impl Renderer {
     pub fn set_technique(&mut self, id: &str) -> Result<()> {
         let mut technique = (techniques::find(id)?.create)(&self.gpu);
         technique.prepare(&self.gpu, self.size())?;
-        self.technique = technique;
         if matches!(self.shown, Shown::Own(_)) {
-            self.shown = Shown::PICTURE;
             self.film.count_pixels(&self.gpu, false)?;
+            self.shown = Shown::PICTURE;
         }
+        self.technique = technique;
         self.reset();
         Ok(())
     }
@@ -86,7 +86,7 @@ impl Renderer {
     pub fn set_view(&mut self, name: &str) -> Result<()> {
         let own = self.technique.info().views;
         let shown = Shown::find(name, own)?;
-        self.film.count_pixels(&self.gpu, shown.view(own).counts)?;
+        self.film.count_pixels(&self.gpu, shown.view(own).counts())?;
         self.shown = shown;
         self.restart_film = true;
         Ok(())
@@ -102,16 +102,18 @@ impl Renderer {
         let Scale::Number { unit, mut low, mut high, is_logarithmic } = self.view().scale else {
             return self.view().scale;
         };
-        if self.film_params.range_low < self.film_params.range_high {
-            (low, high) = (self.film_params.range_low, self.film_params.range_high);
-        } else if self.shown.is_depth() {
+        let FilmParams { range_low, range_high, .. } = self.film_params;
+        // By magnitude there is nothing below 0.
+        if range_low < range_high && (range_high > 0.0 || !is_logarithmic) {
+            (low, high) = (range_low, range_high);
+        } else if self.view().is_depth() {
             high = 4.0 * self.scene_radius();
         } else if let Some(highest) = self.technique.highest(self.view().name) {
             high = highest;
         }
         // Equal ratios have no beginning at 0.
         if is_logarithmic {
-            low = low.max(1e-6 * high.abs());
+            low = low.max(1e-6 * high);
         }
         Scale::Number { unit, low, high, is_logarithmic }
     }

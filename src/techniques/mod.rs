@@ -72,7 +72,7 @@ impl TechniqueInfo {
 
 /// Views that several techniques have.
 pub(crate) mod views {
-    use crate::view::View;
+    use crate::view::{Source, View};
 
     pub const DIRECT: View = View::radiance("direct", "Light that comes straight from lights.");
     pub const INDIRECT: View = View::radiance("indirect", "Light that has scattered more than once.");
@@ -94,12 +94,13 @@ pub(crate) mod views {
         "frames",
         [0.0, 1.0],
     );
-    pub const REJECTED_NEIGHBORS: View = View::count(
+    pub const REJECTED_NEIGHBORS: View = View::number(
         "rejected neighbours",
-        "Neighbours that spatial reuse has looked at and found too different.",
+        "Pixels that reuse has looked at for neighbours and found too different.",
         "pixels",
-        1.0,
-    );
+        [0.0, 1.0],
+    )
+    .by(Source::Rejected);
     pub const LIGHT: View = View::colors("light", "A colour for each light that is chosen; black where none is.");
 }
 

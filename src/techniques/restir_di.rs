@@ -235,11 +235,15 @@ impl Technique for RestirDi {
     }
 
     fn highest(&self, view: &str) -> Option<f32> {
-        let RestirDiParams { spatial_reuse, spatial_iterations, spatial_neighbors, spatial_retries, .. } = self.params;
-        let neighbors = (spatial_reuse * spatial_iterations * spatial_neighbors) as f32;
+        let RestirDiParams { spatial_reuse, spatial_iterations, spatial_neighbors, disocclusion_neighbors, .. } =
+            self.params;
+        let wanted = spatial_neighbors.max(disocclusion_neighbors);
+        let neighbors = (spatial_reuse * spatial_iterations * wanted) as f32;
         match view {
-            "confidence weight" => Some((self.params.history_cap + 1.0) * (1.0 + neighbors)),
-            "rejected neighbours" => Some((neighbors * spatial_retries as f32).max(1.0)),
+            name if name == views::CONFIDENCE_WEIGHT.name => Some((self.params.history_cap + 1.0) * (1.0 + neighbors)),
+            name if name == views::REJECTED_NEIGHBORS.name => {
+                Some((neighbors * self.params.spatial_retries as f32).max(1.0))
+            }
             _ => None,
         }
     }

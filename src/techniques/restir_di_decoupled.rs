@@ -260,8 +260,8 @@ impl Technique for RestirDiDecoupled {
     fn highest(&self, view: &str) -> Option<f32> {
         match view {
             // Its own, and two histories.
-            "confidence weight" => Some(1.0 + 2.0 * self.params.history_cap),
-            "rejected neighbours" => Some((1 + 2 * self.params.spatiotemporal_tries) as f32),
+            name if name == views::CONFIDENCE_WEIGHT.name => Some(1.0 + 2.0 * self.params.history_cap),
+            name if name == views::REJECTED_NEIGHBORS.name => Some((1 + 2 * self.params.spatiotemporal_tries) as f32),
             "age" => Some((self.params.visibility_lifetime as f32).max(1.0)),
             _ => None,
         }

@@ -313,9 +313,10 @@ impl Viewer {
         })
     }
 
-    /// What the last frame saw first: the bytes that [`Renderer::read_surfaces`] describes.
-    pub fn read_surfaces(&self) -> js_sys::Promise {
-        let read = self.renderer.read_surfaces();
+    /// What the last frame saw first: a part of it, in the bytes that [`Renderer::read_surfaces`] describes. One at a time, for memory that
+    /// has grown stays.
+    pub fn read_surfaces(&self, part: usize) -> js_sys::Promise {
+        let read = self.renderer.read_surfaces(part);
         wasm_bindgen_futures::future_to_promise(async move {
             Ok(js_sys::Uint8Array::from(read.await.js()?.as_slice()).into())
         })

@@ -1,13 +1,7 @@
 // What a pixel's initial reservoirs hold: the code of restir-report/initial and of its inspection.
 #include "scene/visibility_buffer.wgsl"
 #include "techniques/restir-report/proposals.wgsl"
-
-@group(1) @binding(4) var<storage, read_write> reservoirs_out: array<ReportReservoir>;
-
-fn store_reservoir(pixel: vec2u, strategy: u32, reservoir: ReportReservoir, reason: u32) {
-    reservoirs_out[reservoir_index(pixel, strategy)] = reservoir;
-    observe_result(strategy, common_reservoir(reservoir), reason);
-}
+#include "techniques/restir-report/store.wgsl"
 
 fn resample(strategy: u32, strategies: Strategies, surface: Surface, rng: ptr<function, Rng>) -> ReportReservoir {
     var stream = stream_empty();

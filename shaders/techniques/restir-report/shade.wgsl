@@ -17,10 +17,6 @@ const VIEW_INDIRECT = 3u;
 const VIEW_SAMPLES_COUNT = 4u;
 const VIEW_BROKEN_WEIGHTS = 5u;
 
-fn is_finite(value: f32) -> bool {
-    return !is_nan(value) && !is_infinite(value);
-}
-
 // f L G V W. A weight that is not finite is not hidden, so that the film counts it: `fault_unguarded_pdf` alone makes any.
 fn shade_strategy(surface: Surface, pixel: vec2u, strategy: u32) -> vec3f {
     let reservoir = reservoirs[reservoir_index(pixel, strategy)];

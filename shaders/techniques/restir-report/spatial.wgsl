@@ -1,6 +1,6 @@
 // Spatial reuse: the reservoirs of one neighbour are merged into the pixel's own.
 // One invocation: one pixel. Reads the visibility buffer, the scene and the reservoirs of the pass before. Writes the merged
-// reservoirs.
+// reservoirs, and counts neighbours that it rejects.
 // Source: report 003, section 4.6: one neighbour "within a radius based on the screen resolution"; and section 9, the checks
 // that it lacks.
 #include "techniques/common/unobserved.wgsl"

@@ -2,20 +2,7 @@
 #include "scene/visibility_buffer.wgsl"
 #include "techniques/restir-report/merge.wgsl"
 #include "techniques/restir-report/similarity.wgsl"
-
-@group(1) @binding(4) var<storage, read> reservoirs: array<ReportReservoir>;
-@group(1) @binding(5) var<storage, read_write> reservoirs_out: array<ReportReservoir>;
-
-fn store_reservoir(pixel: vec2u, strategy: u32, reservoir: ReportReservoir, reason: u32) {
-    reservoirs_out[reservoir_index(pixel, strategy)] = reservoir;
-    observe_result(strategy, common_reservoir(reservoir), reason);
-}
-
-fn keep(pixel: vec2u, reason: u32) {
-    for (var strategy = 0u; strategy < STRATEGY_COUNT; strategy += 1u) {
-        store_reservoir(pixel, strategy, reservoirs[reservoir_index(pixel, strategy)], reason);
-    }
-}
+#include "techniques/restir-report/keep.wgsl"
 
 fn reuse_pixel(pixel: vec2u) {
     if !pixel_has_surface(pixel) {

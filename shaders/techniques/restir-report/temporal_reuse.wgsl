@@ -2,21 +2,9 @@
 #include "techniques/common/reprojection.wgsl"
 #include "techniques/restir-report/merge.wgsl"
 #include "techniques/restir-report/similarity.wgsl"
+#include "techniques/restir-report/keep.wgsl"
 
-@group(1) @binding(4) var<storage, read> reservoirs: array<ReportReservoir>;
 @group(1) @binding(5) var<storage, read> reservoirs_previous: array<ReportReservoir>;
-@group(1) @binding(6) var<storage, read_write> reservoirs_out: array<ReportReservoir>;
-
-fn store_reservoir(pixel: vec2u, strategy: u32, reservoir: ReportReservoir, reason: u32) {
-    reservoirs_out[reservoir_index(pixel, strategy)] = reservoir;
-    observe_result(strategy, common_reservoir(reservoir), reason);
-}
-
-fn keep(pixel: vec2u, reason: u32) {
-    for (var strategy = 0u; strategy < STRATEGY_COUNT; strategy += 1u) {
-        store_reservoir(pixel, strategy, reservoirs[reservoir_index(pixel, strategy)], reason);
-    }
-}
 
 // The history of a strategy as this frame may use it: its area measure is this frame's, its count is capped.
 fn load_history(pixel: vec2u, strategy: u32, own_count: f32) -> ReportReservoir {

@@ -23,7 +23,7 @@ fn pixel_radiance(pixel: vec2u) -> vec3f {
     }
     let surface = load_pixel(pixel);
     if frame.light_count == 0u {
-        return surface.emission;
+        return select(vec3f(0.0), surface.emission, frame.view == 0u);
     }
     var rng = rng_new(pixel, frame.index, frame.seed, STREAM_INITIAL);
     let settings = CandidateSettings(params.candidates, params.bsdf_samples, params.samples, params.stratified);
