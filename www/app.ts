@@ -77,6 +77,8 @@ class App {
   private stats: Stats | undefined;
   private statsTime = 0;
   private hadScene = false;
+  /** Whether the wasm module has failed. */
+  private broken = false;
   private meter: ErrorMeter | undefined;
   private difference: Difference | undefined;
   /** Of the last frame: rendered pixels, frames in the picture, and the scene's moment. */
@@ -151,8 +153,10 @@ class App {
     const restore = () => {
       for (const each of this.viewers()) if (each.stopped) void each.restore();
     };
+    if (code === 'INTERNAL') this.broken = true;
     if (stopped) hideProgress();
-    if (stopped) showError(failure, { onRestart: code === 'INTERNAL' ? () => location.reload() : restore });
+    // While a viewer stands still, whatever else fails offers to start it again, too.
+    if (stopped || this.viewers().some((each) => each.stopped)) showError(failure, { onRestart: this.broken ? () => location.reload() : restore });
     else showError(failure, { final: code === 'NO_WEBGPU' || code === 'NO_ADAPTER' });
   }
 
@@ -340,7 +344,11 @@ class App {
     });
     const search = byId('search', HTMLInputElement);
     search.addEventListener('input', () => filterPanel(byId('panel', HTMLElement), search.value));
-    menu('view').addEventListener('change', () => void this.edited.setView(menu('view').value).then(() => this.legend.update(), () => this.showMenus()));
+    menu('view').addEventListener('change', () => {
+      // A range belongs to one view.
+      this.legend.forgetRange();
+      void this.edited.setView(menu('view').value).then(() => this.legend.update(), () => this.showMenus());
+    });
     menu('target').addEventListener('change', () => this.edit(menu('target').value));
     button('compare').addEventListener('click', () => (this.compare.other ? this.compare.close() : void this.openCompare()));
     menu('scale').addEventListener('change', () => void view.setScale(Number(menu('scale').value) || undefined));

@@ -186,7 +186,8 @@ export class Compare {
       seed: () => second.setSeed(seed),
       time: () => second.setTime(time),
       speed: () => second.setSpeed(speed),
-      animation: () => second.setAnimation(animation),
+      // A scene in which nothing is animated has no animation 0 either.
+      animation: async () => void (first.scene?.report.animations.length && (await second.setAnimation(animation))),
       accumulate: () => second.setAccumulate(accumulate),
       scale: () => second.setScale(scale),
       budget: () => second.setBudget(budget),

@@ -39,6 +39,8 @@ function decades(values: number[]): [number, number] {
 class Track {
   curves: Curve[] = [];
   private measuring = false;
+  /** The last frame of a picture, which came while another one was measured. */
+  private missed: Pick<Reading, 'frames' | 'milliseconds'> | undefined;
   private last = 0;
   /** Of the picture that is being made. */
   private milliseconds = 0;
@@ -77,11 +79,16 @@ class Track {
     this.milliseconds = count <= this.frames ? milliseconds : this.milliseconds + milliseconds;
     this.frames = count;
     if (begins && this.view.accumulating) this.begin();
-    const now = performance.now();
-    if (this.measuring || !(begins || complete || now - this.last > interval)) return;
-    this.measuring = true;
-    this.last = now;
+    if (begins) this.missed = undefined;
     const reading = { frames: count, milliseconds: this.milliseconds };
+    if (this.measuring) {
+      if (complete) this.missed = reading;
+    } else if (begins || complete || performance.now() - this.last > interval) await this.measure(reading, reference);
+  }
+
+  private async measure(reading: Pick<Reading, 'frames' | 'milliseconds'>, reference: Picture): Promise<void> {
+    this.measuring = true;
+    this.last = performance.now();
     const curve = this.curves.at(-1) ?? this.begin();
     try {
       // Between two frames: of the picture that this sample is of.
@@ -94,6 +101,10 @@ class Track {
       if (this.reference() === reference) this.measured((error as Error).message);
     } finally {
       this.measuring = false;
+      const { missed } = this;
+      this.missed = undefined;
+      // The picture stands still, so it is still the one that was missed.
+      if (missed && this.reference() === reference) void this.measure(missed, reference);
     }
   }
 }

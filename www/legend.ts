@@ -33,7 +33,13 @@ export class Legend {
     private readonly setRange: (range: [number, number] | undefined) => void,
   ) {
     byId('legend-fit', HTMLButtonElement).addEventListener('click', () => void this.fit());
-    byId('legend-own', HTMLButtonElement).addEventListener('click', () => this.setRange(undefined));
+    byId('legend-own', HTMLButtonElement).addEventListener('click', () => this.forgetRange());
+  }
+
+  /** Goes back to the view's own range, where another is set. */
+  forgetRange(): void {
+    const { values } = this.viewer().settings;
+    if (values.has('film.range_low') || values.has('film.range_high')) this.setRange(undefined);
   }
 
   /** Asks what is shown now. */

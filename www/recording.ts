@@ -1,4 +1,5 @@
 // Moving pictures: a video of what is shown, and an animation rendered picture by picture at exact moments.
+import type { Failure } from './api.js';
 import type { Compare } from './compare.js';
 import { save } from './files.js';
 import { byId, showError } from './notices.js';
@@ -13,8 +14,8 @@ const number = (id: string) => {
 /** What the pictures of an animation are put into. */
 interface Sequence {
   ending: string;
-  /** Renders the next moment, in seconds, of so many averaged frames, and puts it in. */
-  add(moment: number, samples: number): Promise<void>;
+  /** Renders the next moment, in seconds, of so many averaged frames, fewer where `signal` ends it, and puts it in. */
+  add(moment: number, samples: number, signal: AbortSignal): Promise<void>;
   finish(): Promise<Blob>;
   /** Lets go of it, finished or not. */
   close(): void;
@@ -26,8 +27,8 @@ interface Sequence {
 async function archiveOf(view: RestirViewer, name: string): Promise<Sequence> {
   const { zip } = await import('./zip.js');
   const entries: { name: string; bytes: Uint8Array<ArrayBuffer> }[] = [];
-  const add = async (moment: number, samples: number) => {
-    const png = await view.renderAt(moment, samples);
+  const add = async (moment: number, samples: number, signal: AbortSignal) => {
+    const png = await view.renderAt(moment, samples, { signal });
     entries.push({ name: `${name}-${String(entries.length).padStart(4, '0')}.png`, bytes: new Uint8Array(await png.arrayBuffer()) });
   };
   return { ending: 'zip', add, finish: async () => zip(entries), close: () => undefined };
@@ -37,7 +38,7 @@ async function archiveOf(view: RestirViewer, name: string): Promise<Sequence> {
 async function videoOf(view: RestirViewer, rate: number): Promise<Sequence> {
   const { MomentVideo } = await import('./moment-video.js');
   const video = await MomentVideo.of(...view.size, rate);
-  const add = async (moment: number, samples: number) => video.add(await view.renderAt(moment, samples, { type: 'rgba' }));
+  const add = async (moment: number, samples: number, signal: AbortSignal) => video.add(await view.renderAt(moment, samples, { type: 'rgba', signal }));
   return { ending: 'webm', add, finish: () => video.finish(), close: () => video.close() };
 }
 
@@ -128,15 +129,16 @@ export class Recording {
       await view.setSize(view.size);
       film = await filmOf(rate);
       for (let at = 0; at < count && !signal.aborted; at++) {
-        if (view.scene !== scene || view.loading) throw { code: 'CANCELLED', message: 'Another scene was chosen: no pictures were saved.' };
         this.words.textContent = `Picture ${at + 1} of ${count}`;
-        await film.add(start + at / rate, samples);
+        await film.add(start + at / rate, samples, signal);
+        if (view.scene !== scene || view.loading) throw { code: 'CANCELLED', message: 'Another scene was chosen: no pictures were saved.' };
       }
       if (!signal.aborted) save(await film.finish(), `${this.name()}.${film.ending}`);
       this.words.textContent = signal.aborted ? 'Cancelled.' : `${count} pictures saved.`;
     } catch (error) {
-      this.words.textContent = '';
-      showError(error);
+      const { code, message } = error as Partial<Failure>;
+      this.words.textContent = message ?? '';
+      if (code !== 'CANCELLED') showError(error);
     } finally {
       film?.close();
       this.pictures = undefined;

@@ -22,6 +22,8 @@ function sourceOf(file: string): Promise<string> {
 
 export class Steps {
   private passes: DissectedPass[] = [];
+  /** Counts what was begun and ended: a frame that is taken apart meanwhile is of no use any more. */
+  private turn = 0;
   private at = 0;
   /** Which of its files is shown: the pass's own, or one that it includes. */
   private file = '';
@@ -42,13 +44,16 @@ export class Steps {
     byId('steps-on', HTMLButtonElement).addEventListener('click', () => this.go(this.at + 1));
     // A picture of something else is no frame of these passes.
     for (const event of ['load', 'camera-change', 'param-change', 'restored'] as const) view.addEventListener(event, () => this.end());
+    // Nor does it lie over frames that go on, as after a change of size.
+    view.addEventListener('sample', () => !this.panel.hidden && this.end());
   }
 
   /** Renders the next frame and takes it apart. */
   private async begin(): Promise<void> {
     this.pause();
+    const turn = ++this.turn;
     const passes = await this.view.dissect().catch(() => undefined);
-    if (!passes) return;
+    if (!passes || turn !== this.turn) return;
     this.passes = passes;
     this.panel.hidden = false;
     this.button.setAttribute('aria-pressed', 'true');
@@ -65,6 +70,7 @@ export class Steps {
   }
 
   private end(): void {
+    this.turn += 1;
     if (this.panel.hidden) return;
     this.panel.hidden = this.picture.hidden = true;
     this.button.setAttribute('aria-pressed', 'false');

@@ -494,11 +494,11 @@ export class RestirViewer extends EventTarget {
 
   /**
    * Renders a moment of the scene, in seconds, with so many averaged frames, as a link to it would; the settings stay. What it resolves to
-   * is what `capture` says of the types.
+   * is what `capture` says of the types. It ends early, with the frames there are, by `signal`, or where another scene is loaded.
    */
-  renderAt(seconds: number, frames: number, options: { type: 'rgba' }): Promise<ImageData>;
-  renderAt(seconds: number, frames: number, options?: { type: 'png' }): Promise<Blob>;
-  renderAt(seconds: number, frames: number, { type = 'png' }: { type?: 'png' | 'rgba' } = {}): Promise<ImageData | Blob> {
+  renderAt(seconds: number, frames: number, options: { type: 'rgba'; signal?: AbortSignal }): Promise<ImageData>;
+  renderAt(seconds: number, frames: number, options?: { type?: 'png'; signal?: AbortSignal }): Promise<Blob>;
+  renderAt(seconds: number, frames: number, { type = 'png', signal }: { type?: 'png' | 'rgba'; signal?: AbortSignal } = {}): Promise<ImageData | Blob> {
     return this.reported(async () => {
       checkRange('time', seconds, -1e9, 1e9);
       checkRange('frames', frames, 1, 0xffffffff, true);
@@ -507,6 +507,8 @@ export class RestirViewer extends EventTarget {
         viewer.set_time(seconds);
         viewer.reset();
         for (let frame = 0; frame < frames; frame++) {
+          // A load need not wait for a picture that nobody will have.
+          if (frame > 0 && (signal?.aborted || this.loading)) break;
           await renderFrame(viewer);
         }
         return this.read(viewer);

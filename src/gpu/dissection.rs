@@ -97,9 +97,11 @@ impl Dissection {
     /// `DEVICE` if it cannot be read back.
     pub fn read(&self, gpu: &Gpu, stage: usize) -> impl Future<Output = Result<Vec<u8>>> + use<> {
         let (gpu, picture) = (gpu.clone(), self.stages.get(stage).and_then(|stage| stage.picture.clone()));
+        // The smallest buffers are larger than their pictures.
+        let bytes = u64::from(self.size.x) * u64::from(self.size.y) * 4;
         async move {
             match picture {
-                Some(picture) => gpu.read_buffer(&picture, picture.size()).await,
+                Some(picture) => gpu.read_buffer(&picture, bytes).await,
                 None => Ok(Vec::new()),
             }
         }

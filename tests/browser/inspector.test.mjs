@@ -153,6 +153,17 @@ test('a frame pass by pass: pictures, equations and sources of each', () =>
     await page.waitForFunction(() => document.getElementById('steps').hidden && document.getElementById('passed').hidden, { polling: 50 });
   }));
 
+test('a picture of one pixel is taken apart as well, and ends when frames go on', () =>
+  open('?scene=cornell&size=1x1&technique=normals', async (page) => {
+    await page.focus('#canvas');
+    await page.keyboard.press('t');
+    await page.waitForSelector('#steps:not([hidden])');
+    assert.deepEqual(await page.$eval('#passed', ({ width, height }) => [width, height]), [1, 1]);
+    await page.keyboard.press('Space');
+    await page.waitForFunction(() => document.getElementById('steps').hidden, { polling: 50 });
+    assert.equal(await page.$eval('#message', ({ hidden }) => hidden), true);
+  }));
+
 test('maps of difference: against the reference, and against picture B', () =>
   open('?scene=cornell&size=32x24&technique=path-tracer&render.max_depth=1&frames=4', async (page) => {
     await waitForFrames(page, 4);

@@ -297,6 +297,13 @@ test('a view of a number has a legend with its colours and ends, which can be fi
     assert.ok(colors.has('#440154') && colors.has('#fde725'), 'both ends of viridis are in the picture');
     await page.select('[id="parameter-film.color_map"]', 'magma');
     await page.waitForFunction(() => document.getElementById('legend-bar').style.background.includes('rgb(252, 253, 191)'), { polling: 50 });
+    // Another view has another range.
+    await page.select('#view', 'depth');
+    await page.waitForFunction(() => document.getElementById('legend-low').textContent === '0' && !location.search.includes('range_'), { polling: 50 });
+    await page.select('#view', 'BVH steps');
+    await page.waitForFunction(() => document.getElementById('legend-high').textContent === '1024', { polling: 50 });
+    await page.click('#legend-fit');
+    await page.waitForFunction(() => document.getElementById('legend-high').textContent !== '1024', { polling: 50 });
     await page.click('#legend-own');
     await page.waitForFunction(() => document.getElementById('legend-high').textContent === '1024', { polling: 50 });
     assert.equal(await page.$eval('#legend-own', (button) => button.disabled), true);
