@@ -159,7 +159,7 @@ test('a picture of one pixel is taken apart as well, and ends when frames go on'
     await page.keyboard.press('t');
     await page.waitForSelector('#steps:not([hidden])');
     assert.deepEqual(await page.$eval('#passed', ({ width, height }) => [width, height]), [1, 1]);
-    await page.keyboard.press('Space');
+    await page.keyboard.press(' ');
     await page.waitForFunction(() => document.getElementById('steps').hidden, { polling: 50 });
     assert.equal(await page.$eval('#message', ({ hidden }) => hidden), true);
   }));
