@@ -115,7 +115,11 @@ export class Recording {
       this.words.textContent = 'Frames, frames a second and averaged frames must be numbers within their ranges.';
       return;
     }
-    const { signal } = (this.pictures = new AbortController());
+    const controller = (this.pictures = new AbortController());
+    const { signal } = controller;
+    // A scene may take over before the first frame of a picture.
+    const stop = () => controller.abort();
+    view.addEventListener('load', stop);
     const others = [this.picturesButton, this.exactButton].filter((each) => each !== button);
     const label = button.textContent;
     button.textContent = 'Cancel';
@@ -140,6 +144,7 @@ export class Recording {
       this.words.textContent = message ?? '';
       if (code !== 'CANCELLED') showError(error);
     } finally {
+      view.removeEventListener('load', stop);
       film?.close();
       this.pictures = undefined;
       button.textContent = label;

@@ -286,22 +286,3 @@ test('where the browser records no video it says so', () =>
     },
     () => delete window.MediaRecorder,
   ));
-
-test('a recording is cancelled within a picture, and another scene need not wait for it', () =>
-  withPage(site, '?scene=motion&technique=normals&size=32x24', async (page) => {
-    await unfold(page, 'recording');
-    const words = (part) => page.waitForFunction((wanted) => document.getElementById('record-words').textContent.includes(wanted), { polling: 50 }, part);
-    const begin = async () => {
-      for (const [id, value] of [['record-count', 2], ['record-samples', 65536]]) await page.$eval(`#${id}`, (input, text) => (input.value = text), String(value));
-      await page.click('#record-pictures');
-      await words('Picture 1 of 2');
-    };
-    await begin();
-    await page.click('#record-pictures');
-    await words('Cancelled.');
-    await begin();
-    await page.select('#scene', 'furnace');
-    await words('Another scene was chosen');
-    await page.waitForFunction(() => location.search.includes('scene=furnace'), { polling: 50 });
-    await waitForFrames(page, 1);
-  }));
