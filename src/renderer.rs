@@ -77,8 +77,8 @@ pub struct Renderer {
     accumulated: u32,
     restart_film: bool,
     inspector: Option<Inspector>,
-    /// A frame that was begun and is to be finished.
-    begun: Option<Recording>,
+    /// A frame that was begun and is to be finished, and what keeps what its passes write.
+    begun: Option<(Recording, Option<Dissection>)>,
     /// One line for each shader whose last edit did not compile (debug builds).
     pub shader_problems: Vec<String>,
 }
@@ -298,41 +298,41 @@ impl Renderer {
     /// As [`Renderer::render_frame`].
     pub fn begin_frame(&mut self) -> Result<usize> {
         let recording = self.record(None, true)?.finish();
+        Ok(self.begin(recording, None))
+    }
+
+    /// As [`Renderer::begin_frame`], for a frame that [`Renderer::finish_frame`] returns taken apart: what each of its passes has written.
+    ///
+    /// # Errors
+    /// As [`Renderer::render_frame`]; `LIMIT` also if the pictures do not fit.
+    pub fn begin_dissected_frame(&mut self) -> Result<usize> {
+        let mut dissection = Dissection::new(self.size(), self.film.exposure_state().clone());
+        let easel = Easel::new(&self.gpu, self.size())?;
+        let recording = self.record(Some((&mut dissection, &easel)), true)?.finish();
+        Ok(self.begin(recording, Some(dissection)))
+    }
+
+    fn begin(&mut self, recording: Recording, dissection: Option<Dissection>) -> usize {
         let unmade = recording.unmade(&self.gpu);
-        self.begun = Some(recording);
-        Ok(unmade)
+        self.begun = Some((recording, dissection));
+        unmade
     }
 
     /// Makes the next of the pipelines that the begun frame waits for. Resolves when the device has compiled it.
     pub fn make_pipeline(&mut self) -> impl Future<Output = ()> + use<> {
-        if let Some(recording) = &mut self.begun {
+        if let Some((recording, _)) = &mut self.begun {
             recording.make_pipeline(&self.gpu);
         }
         self.gpu.taken_in()
     }
 
-    /// Submits what is left of the begun frame.
+    /// Submits what is left of the begun frame. Returns it taken apart if it was begun so.
     ///
     /// # Errors
     /// `DEVICE` for an error the device has reported.
-    pub fn finish_frame(&mut self) -> Result<()> {
-        match self.begun.take() {
-            Some(recording) => {
-                recording.submit(&self.gpu);
-                self.note_frame()
-            }
-            None => Ok(()),
-        }
-    }
-
-    /// Renders one frame as [`Renderer::render_frame`] does, its display included, and keeps what each pass has written.
-    ///
-    /// # Errors
-    /// As [`Renderer::render_frame`]; `LIMIT` also if the pictures do not fit.
-    pub fn dissect_frame(&mut self) -> Result<Dissection> {
-        let mut dissection = Dissection::new(self.size(), self.film.exposure_state().clone());
-        let easel = Easel::new(&self.gpu, self.size())?;
-        self.record(Some((&mut dissection, &easel)), true)?.submit();
+    pub fn finish_frame(&mut self) -> Result<Option<Dissection>> {
+        let Some((recording, dissection)) = self.begun.take() else { return Ok(None) };
+        recording.submit(&self.gpu);
         self.note_frame()?;
         Ok(dissection)
     }

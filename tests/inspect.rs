@@ -4,6 +4,7 @@ mod support;
 
 use glam::UVec2;
 use restir::Renderer;
+use restir::gpu::dissection::Dissection;
 use restir::inspect::{Inspection, Note};
 use support::{cases, gpu};
 
@@ -142,6 +143,11 @@ fn surface_and_mean_are_those_of_the_pictures() {
     assert_eq!(seen.samples, 4.0);
 }
 
+fn dissected_frame(renderer: &mut Renderer) -> Dissection {
+    renderer.begin_dissected_frame().unwrap();
+    renderer.finish_frame().unwrap().expect("it was begun so")
+}
+
 #[test]
 fn looking_on_changes_no_picture() {
     let picture = |inspected: bool, dissected: bool| {
@@ -149,7 +155,7 @@ fn looking_on_changes_no_picture() {
         renderer.inspect(inspected.then_some(UVec2::new(16, 20))).unwrap();
         for frame in 0..3 {
             if dissected && frame == 1 {
-                renderer.dissect_frame().unwrap();
+                dissected_frame(&mut renderer);
             } else {
                 renderer.render_frame().unwrap();
             }
@@ -167,7 +173,7 @@ fn a_dissected_frame_shows_what_each_pass_wrote() {
     let mut renderer =
         renderer("cornell", "restir-di", &[("spatial_confidence_limit", "1000"), ("film.exposure", "1")]);
     renderer.render_frame().unwrap();
-    let frame = renderer.dissect_frame().unwrap();
+    let frame = dissected_frame(&mut renderer);
     let ids: Vec<_> = frame.stages.iter().map(|stage| stage.shader.id).collect();
     let expected = [
         "scene/visibility",

@@ -23,7 +23,9 @@ export function readAddress(search: string): Address {
   const query = new URLSearchParams(search);
   const second = query.get('b') ?? undefined;
   query.delete('b');
-  return { ...readQuery(query.toString()), second };
+  const { state, warnings } = readQuery(query.toString());
+  const ofSecond = readQuery(second ?? '').warnings.map((warning) => `picture B: ${warning}`);
+  return { state, second, warnings: [...warnings, ...ofSecond] };
 }
 
 /** Milliseconds until a change that slides is written: browsers do not let the address change as fast as a slider moves. */

@@ -77,6 +77,8 @@ class App {
   private stats: Stats | undefined;
   private statsTime = 0;
   private hadScene = false;
+  /** What is listed. */
+  private warnings: string[] = [];
   /** Whether the wasm module has failed. */
   private broken = false;
   private meter: ErrorMeter | undefined;
@@ -101,8 +103,11 @@ class App {
     this.follow();
     this.meter = new ErrorMeter(view);
     this.difference = new Difference(view, this.compare);
-    new Inspector(view, byId('canvas', HTMLCanvasElement));
-    new Steps(view, () => this.pause(true));
+    const inspector: Inspector = new Inspector(view, byId('canvas', HTMLCanvasElement), () => steps.end());
+    const steps = new Steps(view, () => {
+      void inspector.end();
+      this.pause(true);
+    });
     new Recording(view, this.compare, () => this.fileName());
     const opening = view.load(scene, { environment, choice });
     try {
@@ -114,7 +119,9 @@ class App {
     }
     try {
       await opening;
-      if (this.query.second !== undefined) await this.compare.open(this.query.second);
+      if (this.query.second === undefined) return;
+      await this.compare.open(this.query.second);
+      this.addWarnings();
     } catch (problem) {
       // The user has chosen something else meanwhile.
       if (view.loading) return;
@@ -188,7 +195,14 @@ class App {
 
   private showWarnings(report: SceneReport): void {
     // Those of the address are told once.
-    showWarnings([...this.query.warnings.splice(0), ...report.warnings]);
+    this.warnings = [...this.query.warnings.splice(0), ...report.warnings];
+    showWarnings(this.warnings);
+  }
+
+  /** Shows those of the address that have come since the others were shown. */
+  private addWarnings(): void {
+    this.warnings.unshift(...this.query.warnings.splice(0));
+    showWarnings(this.warnings);
   }
 
   /** Where the scene or what surrounds it are files of the user's, these. */
@@ -209,8 +223,9 @@ class App {
     if (address.second === undefined) compare.close();
     else await compare.show(address.second);
     this.showMenus();
-    // Another scene has been shown with all that belongs to it.
-    if (!view.scene || view.scene !== before) return;
+    // Another scene has been shown with all that belongs to it, but for the second picture's warnings.
+    if (view.scene !== before) return this.addWarnings();
+    if (!view.scene) return;
     this.showTime(view.scene.report);
     this.showWarnings(view.scene.report);
   }

@@ -76,7 +76,7 @@ export class Compare {
     first.addEventListener('camera-change', ({ detail }) => void this.second?.setCamera(detail, { moving: true }), { signal });
     first.addEventListener('load', () => this.follow(), { signal });
     first.addEventListener('param-change', ({ detail }) => this.pass(detail.name), { signal });
-    first.addEventListener('sample', ({ detail }) => this.second && this.label('a', first, detail.count), { signal });
+    first.addEventListener('sample', ({ detail }) => this.label('a', first, detail.count), { signal });
   }
 
   /** The second picture's viewer, while there is one. */
@@ -101,7 +101,10 @@ export class Compare {
     second.suspended = first.suspended;
     second.addEventListener('param-change', ({ detail }) => this.changed(detail));
     // A fault of the second's is told as the first's are.
-    second.addEventListener('error', ({ detail }) => first.dispatchEvent(new CustomEvent('error', { detail })));
+    second.addEventListener('error', ({ detail }) => {
+      const { setting } = detail;
+      first.dispatchEvent(new CustomEvent('error', { detail: { ...detail, ...(setting !== undefined && { setting: `picture B: ${setting}` }) } }));
+    });
     second.addEventListener('sample', ({ detail }) => this.label('b', second, detail.count));
     this.part(50);
     this.follow();

@@ -79,6 +79,7 @@ export class Difference {
       const [picture, other] = await Promise.all([this.view.readPicture(), this.other()]);
       if (!other) return this.say('Keep a reference, or compare with a second picture.');
       if (picture.width !== other.width || picture.height !== other.height) return this.say('The two are of different sizes.');
+      if (picture.view !== other.view) return this.say(`The one shows ${picture.view}, the other ${other.view}.`);
       const values = kind === 'flip' ? await flipOf(picture, other) : signedDifference(picture, other);
       if (this.menu.value !== kind) return;
       const mean = values.reduce((sum, value) => sum + value, 0) / values.length;

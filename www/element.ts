@@ -44,6 +44,13 @@ function cameraOf(text: string | null): string | Pose {
 
 const numberOf = (text: string | null) => (text === null ? undefined : Number(text));
 
+/** A moment in seconds. */
+function timeOf(text: string | null): number {
+  const time = numberOf(text) ?? 0;
+  if (Number.isFinite(time)) return time;
+  throw { code: 'BAD_VALUE', message: `time=${text}: must be a number of seconds` };
+}
+
 export interface RestirViewerElement {
   addEventListener<Type extends keyof ViewerEventMap>(
     type: Type,
@@ -79,6 +86,8 @@ export class RestirViewerElement extends HTMLElement {
   private applying = false;
   private wasSeen = false;
   private hasPicture = false;
+  /** Whether the message is about what is still being loaded: then it stays. */
+  private isOfLoad = false;
 
   constructor() {
     super();
@@ -137,6 +146,10 @@ export class RestirViewerElement extends HTMLElement {
       this.progress.hidden = false;
       this.progress.value = detail.fraction;
     });
+    viewer.addEventListener('load', () => {
+      // What was wrong before has nothing to do with what is shown now.
+      if (!this.isOfLoad) this.message.hidden = true;
+    });
     viewer.addEventListener('sample', () => {
       this.poster.hidden = this.hasPicture = true;
       // A frame of the former scene ends no load. What the load has just complained of stays.
@@ -150,6 +163,7 @@ export class RestirViewerElement extends HTMLElement {
   }
 
   private showFailure(failure: ViewerFailure): void {
+    this.isOfLoad = this.current?.opening ?? false;
     const { title, text } = explain(failure);
     this.message.textContent = `${title}: ${text}`;
     this.message.hidden = false;
@@ -218,18 +232,24 @@ export class RestirViewerElement extends HTMLElement {
     const source = this.getAttribute('src');
     if (source === null) return;
     const camera = () => cameraOf(this.getAttribute('camera'));
-    const time = () => numberOf(this.getAttribute('time')) ?? 0;
+    const time = () => timeOf(this.getAttribute('time'));
     if (this.changed('src')) {
       const environment = this.getAttribute('environment');
       this.changed('environment', 'camera', 'time');
-      let place: string | Pose = '0';
-      try {
-        place = camera();
-      } catch (error) {
-        this.showFailure(toFailure(error));
-      }
-      const loading = viewer.load(source, { environment, time: time(), ...(typeof place === 'string' ? { camera: place } : { pose: place }) });
+      const problems: unknown[] = [];
+      const read = <T>(value: () => T, standard: T): T => {
+        try {
+          return value();
+        } catch (problem) {
+          problems.push(problem);
+          return standard;
+        }
+      };
+      const place = read<string | Pose>(camera, '0');
+      const loading = viewer.load(source, { environment, time: read(time, 0), ...(typeof place === 'string' ? { camera: place } : { pose: place }) });
       loading.catch(() => (this.progress.hidden = !viewer.loading));
+      // After it has begun: they are of this load.
+      for (const problem of problems) this.showFailure(toFailure(problem));
       return;
     }
     if (this.changed('environment')) void viewer.setEnvironment(this.getAttribute('environment'));

@@ -75,6 +75,7 @@ class Track {
     const reference = this.reference();
     // A picture of another size is about to be resized.
     if (reference?.width !== width || reference.height !== height) return;
+    if (reference.view !== this.view.settings.view) return;
     const begins = count <= this.frames || this.curves.length === 0;
     this.milliseconds = count <= this.frames ? milliseconds : this.milliseconds + milliseconds;
     this.frames = count;
@@ -120,6 +121,10 @@ export class ErrorMeter {
     byId('errors-axis', HTMLSelectElement).addEventListener('change', () => this.show());
     // From elsewhere, or of something else, the same light looks otherwise.
     for (const event of ['camera-change', 'load'] as const) view.addEventListener(event, () => this.forget());
+    view.addEventListener('sample', ({ detail: { time } }) => {
+      if (this.kept && view.moves && time !== this.kept.time) this.forget();
+    });
+    view.addEventListener('param-change', ({ detail: { name } }) => name === 'view' && this.kept && this.show());
     this.show();
   }
 
@@ -151,7 +156,13 @@ export class ErrorMeter {
     if (!this.kept) return;
     this.kept = undefined;
     this.view.forgetReference();
-    this.show('The camera or the scene has changed: keep a new reference.');
+    this.show('The camera, the moment or the scene has changed: keep a new reference.');
+  }
+
+  /** Says so where the picture shows something else than what was kept. */
+  private get otherView(): string {
+    const { view } = this.view.settings;
+    return this.kept && this.kept.view !== view ? `The reference shows ${this.kept.view}, the picture ${view}: nothing is measured meanwhile.` : '';
   }
 
   private get curves(): Curve[] {
@@ -160,7 +171,7 @@ export class ErrorMeter {
 
   private show(words = 'Let the path tracer average many frames, keep the picture, then choose what to compare with it.'): void {
     const latest = this.tracks.map(({ curves }) => curves.at(-1)?.readings.at(-1));
-    const shown = this.kept && latest.some((reading) => reading);
+    const shown = this.kept && !this.otherView && latest.some((reading) => reading);
     const figures: [string, (reading: Reading) => string][] = [
       ['MSE', ({ mse }) => mse.toExponential(2)],
       ['relative MSE', ({ relmse }) => relmse.toExponential(2)],
@@ -177,7 +188,7 @@ export class ErrorMeter {
     const rows = figures.map(([name, value]) => line(cell('th', name, 'row'), ...latest.map((reading) => cell('td', reading ? value(reading) : '–'))));
     const heads = latest.length > 1 ? [line(cell('td', ''), cell('th', 'A', 'col'), cell('th', 'B', 'col'))] : [];
     byId('errors-table', HTMLTableElement).replaceChildren(...(shown ? [...heads, ...rows] : []));
-    byId('errors-words', HTMLElement).textContent = this.kept ? '' : words;
+    byId('errors-words', HTMLElement).textContent = this.kept ? this.otherView : words;
     byId('errors-csv', HTMLButtonElement).disabled = this.curves.every((curve) => curve.readings.length === 0);
     this.plot();
   }

@@ -1,4 +1,5 @@
 // Writes OpenEXR files as `restir render` does (src/output/exr.rs): 32-bit float scanlines, ZIP compression by the browser's own deflate.
+import { joined } from './bytes.js';
 
 /** A picture with what its pixels see first. Rows from the top. */
 export interface ExrPicture {
@@ -42,16 +43,6 @@ const rec709 = [0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329];
 
 type Bytes = Uint8Array<ArrayBuffer>;
 
-function join(parts: readonly Bytes[]): Bytes {
-  const all = new Uint8Array(parts.reduce((sum, { length }) => sum + length, 0));
-  let at = 0;
-  for (const part of parts) {
-    all.set(part, at);
-    at += part.length;
-  }
-  return all;
-}
-
 const text = (words: string): Bytes => new TextEncoder().encode(words);
 /** Ended by a zero, as names are. */
 const named = (words: string): Bytes => text(`${words}\0`);
@@ -63,13 +54,13 @@ function numbers(kind: 'Int32' | 'Float32', ...values: number[]): Bytes {
   return new Uint8Array(view.buffer);
 }
 
-const attribute = (name: string, type: string, value: Bytes): Bytes => join([named(name), named(type), numbers('Int32', value.length), value]);
+const attribute = (name: string, type: string, value: Bytes): Bytes => joined([named(name), named(type), numbers('Int32', value.length), value]);
 
 function header({ width, height, attributes }: ExrPicture): Bytes {
   // Not linear in perception, three reserved bytes, no subsampling.
-  const list = join([...channels.map(([name]) => join([named(name), numbers('Int32', float, 0, 1, 1)])), Uint8Array.of(0)]);
+  const list = joined([...channels.map(([name]) => joined([named(name), numbers('Int32', float, 0, 1, 1)])), Uint8Array.of(0)]);
   const window = numbers('Int32', 0, 0, width - 1, height - 1);
-  return join([
+  return joined([
     // The magic number, and version 2 without flags.
     numbers('Int32', 20000630, 2),
     attribute('channels', 'chlist', list),
@@ -131,7 +122,7 @@ export async function encodeExr(picture: ExrPicture): Promise<Blob> {
   for (let index = 0; index < count; index++) {
     const first = index * chunkRows;
     const data = await compressed(rows(picture, first));
-    const chunk = join([numbers('Int32', first, data.length), data]);
+    const chunk = joined([numbers('Int32', first, data.length), data]);
     table[index] = BigInt(offset);
     offset += chunk.length;
     chunks.push(chunk);

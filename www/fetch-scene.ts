@@ -1,4 +1,5 @@
 // A scene file by its address, and the files that it names, which lie beside it.
+import { joined } from './bytes.js';
 
 /** Told of bytes that have come, and of bytes that will come besides. */
 export type Received = (bytes: number, announced: number) => void;
@@ -16,13 +17,7 @@ async function bytesOf(response: Response, received: Received): Promise<Uint8Arr
     pieces.push(value);
     received(value.length, 0);
   }
-  const whole = new Uint8Array(pieces.reduce((sum, { length }) => sum + length, 0));
-  let at = 0;
-  for (const piece of pieces) {
-    whole.set(piece, at);
-    at += piece.length;
-  }
-  return whole;
+  return joined(pieces);
 }
 
 /** The bytes at `address`; throws IO, with `name` and the reason. */

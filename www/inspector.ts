@@ -47,6 +47,8 @@ export class Inspector {
   constructor(
     private readonly view: RestirViewer,
     canvas: HTMLCanvasElement,
+    /** Told when it opens: there is room for one panel. */
+    private readonly opening: () => void,
   ) {
     this.button.addEventListener('click', () => void (this.active ? this.end() : this.begin()));
     byId('inspector-close', HTMLButtonElement).addEventListener('click', () => void this.end());
@@ -78,13 +80,16 @@ export class Inspector {
 
   /** Opens the panel, at the middle of the picture until a pixel is clicked. */
   private async begin(): Promise<void> {
+    this.opening();
     this.panel.hidden = false;
     this.button.setAttribute('aria-pressed', 'true');
     document.body.classList.add('inspecting');
     await this.choose(this.pixel ?? [this.size[0] >> 1, this.size[1] >> 1]);
   }
 
-  private async end(): Promise<void> {
+  /** Closes the panel, if it is open. */
+  async end(): Promise<void> {
+    if (!this.active) return;
     this.panel.hidden = true;
     this.button.setAttribute('aria-pressed', 'false');
     document.body.classList.remove('inspecting');

@@ -69,5 +69,6 @@ export class Legend {
     if (!picture) return;
     const range = fittedRange(picture.pixels.filter((_, at) => at % 3 === 0), this.shown?.logarithmic ?? false);
     if (range) this.setRange(range);
+    else byId('legend-unit', HTMLElement).textContent = 'all alike: nothing to fit';
   }
 }

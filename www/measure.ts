@@ -2,8 +2,12 @@
 import type { Errors, Failure } from './api.js';
 import { compileWasm } from './wasm.js';
 
-/** Linear Rec. 709 radiance: three numbers a pixel, row-major from the top. */
+/** Linear Rec. 709 radiance, or what a debug view shows: three numbers a pixel, row-major from the top. */
 export interface Picture {
+  /** `radiance`, or the name of the view. */
+  view: string;
+  /** Moment of the scene, in seconds. */
+  time: number;
   width: number;
   height: number;
   pixels: Float32Array;
@@ -53,6 +57,9 @@ async function ask(kind: MeasureRequest['kind'], picture: Picture, reference: Pi
     const size = ({ width, height }: Picture) => `${width}x${height}`;
     throw { code: 'BAD_VALUE', message: `a picture of ${size(picture)} is not compared with one of ${size(reference)}` };
   }
+  if (picture.view !== reference.view) {
+    throw { code: 'BAD_VALUE', message: `a picture of ${picture.view} is not compared with one of ${reference.view}` };
+  }
   const module = await compileWasm();
   worker ??= start();
   const id = ++count;
@@ -64,7 +71,7 @@ async function ask(kind: MeasureRequest['kind'], picture: Picture, reference: Pi
   });
 }
 
-/** Distances of a picture from a reference. Rejects with `BAD_VALUE` where they are of different sizes. */
+/** Distances of a picture from a reference. Rejects with `BAD_VALUE` where they are of different sizes or views. */
 export const errorsOf = (picture: Picture, reference: Picture) => ask('errors', picture, reference) as Promise<Errors>;
 
 /** FLIP of each pixel, 0 to 1: what an observer perceives when the two are shown in turn (Andersson et al. 2020). Rejects as `errorsOf`. */

@@ -29,7 +29,7 @@ const known: Record<string, { title: string; advice: string }> = {
   CLIPBOARD: { title: 'The browser does not let the page copy', advice: 'Copy the text above by hand.' },
   NO_RECORDER: { title: 'This browser records no video', advice: 'Save the pictures one by one, or use a current Chrome, Edge or Firefox.' },
   STORAGE: { title: 'The browser keeps nothing for this page', advice: 'Allow the page to store data, or copy a link to the picture.' },
-  BAD_FILE: { title: 'This file is broken', advice: 'Export it again, or check it with the Khronos glTF validator.' },
+  BAD_FILE: { title: 'This file is broken', advice: 'Export it again. What is wrong with a glTF file the Khronos glTF validator tells in full.' },
   UNSUPPORTED: { title: 'This file needs something restir does not have', advice: 'Export it without that extension.' },
   UNKNOWN_NAME: { title: 'Unknown name', advice: 'Choose one from the menus.' },
   BAD_VALUE: { title: 'A value is out of range', advice: 'The former value stays.' },

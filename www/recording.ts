@@ -126,11 +126,10 @@ export class Recording {
     for (const other of others) other.disabled = true;
     const start = view.settings.time;
     const { scene } = view;
-    const { size } = view.settings;
     let film: Sequence | undefined;
     try {
       // All pictures are of one size, and so is what they are put into.
-      await view.setSize(view.size);
+      view.holdSize(true);
       film = await filmOf(rate);
       for (let at = 0; at < count && !signal.aborted; at++) {
         this.words.textContent = `Picture ${at + 1} of ${count}`;
@@ -146,12 +145,13 @@ export class Recording {
     } finally {
       view.removeEventListener('load', stop);
       film?.close();
+      view.holdSize(false);
+      // Back to the moment that was shown, unless something else was asked for.
+      if (film && view.scene === scene && !view.loading) await view.show(view.settings, view.scene).catch(() => undefined);
+      // Last: the next recording begins with what this one has put back.
       this.pictures = undefined;
       button.textContent = label;
       for (const other of others) other.disabled = false;
-      await view.setSize(size).catch(() => undefined);
-      // Back to the moment that was shown, unless something else was asked for.
-      if (film && view.scene === scene && !view.loading) await view.show(view.settings, view.scene).catch(() => undefined);
     }
   }
 }

@@ -11,11 +11,12 @@ const slice = 8;
 
 /**
  * Renders a frame and presents it, and waits for the device. Pipelines that it waits for are asked for one by one, and the page draws and
- * listens meanwhile; `making` is told how many of how many the device has compiled, also where there are none.
+ * listens meanwhile; `making` is told how many of how many the device has compiled, also where there are none. A frame that is `dissected`
+ * leaves what its passes wrote with the viewer.
  */
-export async function renderFrame(viewer: Viewer, making: (made: number, all: number) => void = () => undefined): Promise<void> {
+export async function renderFrame(viewer: Viewer, making: (made: number, all: number) => void = () => undefined, dissected = false): Promise<void> {
   let began = performance.now();
-  const all = viewer.begin();
+  const all = dissected ? viewer.begin_dissected() : viewer.begin();
   making(0, all);
   let made = 0;
   const compiled: Promise<void>[] = [];
@@ -114,6 +115,14 @@ export class RenderLoop {
       // What failed has changed nothing.
       this.changed = true;
       return result;
+    });
+  }
+
+  /** As `call`, for work that renders a frame, in which is what has changed until now. */
+  frame<T>(work: (viewer: Viewer) => Promise<T>): Promise<T> {
+    return this.call((viewer) => {
+      this.changed = false;
+      return work(viewer);
     });
   }
 

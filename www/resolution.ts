@@ -12,6 +12,8 @@ export class Resolution {
   /** What the user asked for; undefined adapts. */
   fixedSize: [number, number] | undefined;
   fixedScale: number | undefined;
+  /** What goes before all that for a while. */
+  held: [number, number] | undefined;
   private readonly automatic = new FrameBudget();
   private movedAt = -Infinity;
   private inMotion = false;
@@ -37,7 +39,7 @@ export class Resolution {
 
   /** Whether the scale adapts. */
   get adapts(): boolean {
-    return !this.fixedSize && this.fixedScale === undefined;
+    return !this.held && !this.fixedSize && this.fixedScale === undefined;
   }
 
   /** The camera moves: until it rests, frames come in time rather than sharp. */
@@ -47,7 +49,8 @@ export class Resolution {
 
   /** Width and height to render, in pixels. */
   size(): [number, number] {
-    if (this.fixedSize) return this.fixedSize;
+    const fixed = this.held ?? this.fixedSize;
+    if (fixed) return fixed;
     this.inMotion = performance.now() - this.movedAt < restAfter;
     const scale = (this.fixedScale ?? this.automatic.scale(this.inMotion)) * devicePixelRatio;
     const side = (length: number) => Math.min(Math.max(Math.round(length * scale), 1), longestSide);

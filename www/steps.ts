@@ -34,8 +34,8 @@ export class Steps {
 
   constructor(
     private readonly view: RestirViewer,
-    /** Stops the picture, so that the frame stays. */
-    private readonly pause: () => void,
+    /** Told before it opens: the picture is to stop, so that the frame stays, and there is room for one panel. */
+    private readonly opening: () => void,
   ) {
     this.button.addEventListener('click', () => (this.panel.hidden ? void this.begin() : this.end()));
     byId('steps-close', HTMLButtonElement).addEventListener('click', () => this.end());
@@ -50,7 +50,7 @@ export class Steps {
 
   /** Renders the next frame and takes it apart. */
   private async begin(): Promise<void> {
-    this.pause();
+    this.opening();
     const turn = ++this.turn;
     const passes = await this.view.dissect().catch(() => undefined);
     if (!passes || turn !== this.turn) return;
@@ -69,7 +69,8 @@ export class Steps {
     this.go(0);
   }
 
-  private end(): void {
+  /** Closes the panel, if it is open. */
+  end(): void {
     this.turn += 1;
     if (this.panel.hidden) return;
     this.panel.hidden = this.picture.hidden = true;

@@ -353,8 +353,13 @@ export class RestirViewer extends EventTarget {
 
   /** Whether frames are averaged. */
   get accumulating(): boolean {
+    return this.settings.accumulate ?? !this.moves;
+  }
+
+  /** Whether the scene looks otherwise at another moment. */
+  get moves(): boolean {
     const turns = Number(this.settings.values.get('render.environment_rotation_rate') ?? 0) !== 0;
-    return this.settings.accumulate ?? !(this.shown?.report.animated || turns);
+    return turns || (this.shown?.report.animated ?? false);
   }
 
   /** Rendered pixels per device pixel along one side, 0.1 to 2; undefined adapts to the time that frames take. */
@@ -383,6 +388,11 @@ export class RestirViewer extends EventTarget {
       this.settings.size = this.resolution.fixedSize = size;
       this.emit('param-change', { name: 'size', value: size?.join('x') });
     });
+  }
+
+  /** While true all pictures are as large as the last one, whatever `settings` say: those of a recording are. */
+  holdSize(on: boolean): void {
+    this.resolution.held = on ? this.size : undefined;
   }
 
   /** Stops after so many averaged frames, until something changes; undefined goes on. */
@@ -557,7 +567,7 @@ export class RestirViewer extends EventTarget {
   readPicture(): Promise<Picture> {
     return this.call(async (viewer) => {
       const [width, height] = this.rendered;
-      return { width, height, pixels: (await viewer.read_picture()) as Float32Array };
+      return { view: this.settings.view, time: this.moment, width, height, pixels: (await viewer.read_picture()) as Float32Array };
     });
   }
 
@@ -580,7 +590,7 @@ export class RestirViewer extends EventTarget {
     this.kept = undefined;
   }
 
-  /** How far the picture is from a reference. Rejects with `BAD_VALUE` where there is none, or one of another size. */
+  /** How far the picture is from a reference. Rejects with `BAD_VALUE` where there is none, or one of another size or view. */
   async errors(reference = this.kept): Promise<Errors> {
     if (!reference) throw invalid('There is no reference yet.');
     const picture = await this.readPicture();
@@ -617,9 +627,10 @@ export class RestirViewer extends EventTarget {
   /** Renders one frame, and resolves to what each of its passes wrote. */
   dissect(): Promise<DissectedPass[]> {
     return this.reported(() =>
-      this.call(async (viewer) => {
+      this.loop.frame(async (viewer) => {
         const [width, height] = this.rendered;
-        const passes = JSON.parse(viewer.dissect()) as { id: string; file: string; has_picture: boolean }[];
+        await renderFrame(viewer, undefined, true);
+        const passes = JSON.parse(viewer.dissection()) as { id: string; file: string; has_picture: boolean }[];
         const dissected: DissectedPass[] = [];
         try {
           for (const [index, { id, file, has_picture: hasPicture }] of passes.entries()) {

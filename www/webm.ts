@@ -1,4 +1,5 @@
 // Writes WebM files: one video track, each frame at its own time (the WebM container guidelines; RFC 8794 and 9559).
+import { joined } from './bytes.js';
 
 /** A frame as the encoder gives it. */
 export interface EncodedFrame {
@@ -60,15 +61,8 @@ const begin = (id: number, length: number): Bytes => Uint8Array.from([...bigEndi
 
 /** An element of these bytes or elements. */
 function element(id: number, ...parts: Bytes[]): Bytes {
-  const length = parts.reduce((sum, part) => sum + part.length, 0);
-  const head = begin(id, length);
-  const all = new Uint8Array(head.length + length);
-  let at = 0;
-  for (const part of [head, ...parts]) {
-    all.set(part, at);
-    at += part.length;
-  }
-  return all;
+  const content = joined(parts);
+  return joined([begin(id, content.length), content]);
 }
 
 const whole = (id: number, value: number, length = byteCount(value)): Bytes => element(id, Uint8Array.from(bigEndian(value, length)));

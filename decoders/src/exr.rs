@@ -9,6 +9,9 @@ use ::exr::meta::attribute::{Compression, SampleType};
 use ::exr::meta::header::Header;
 use std::io::Cursor;
 
+/// What every OpenEXR file begins with.
+pub const SIGNATURE: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+
 /// The compressions that are read. The exr crate's decoders of B44 and DWA overflow or allocate without bound on
 /// hostile files, which no check of the header can prevent.
 const COMPRESSIONS: [Compression; 6] = [
@@ -33,7 +36,7 @@ pub fn decode(bytes: &[u8], most: usize) -> Result<Map> {
         ::exr::error::Error::NotSupported(what) => Fault::Unsupported(what.into()),
         other => bad(place, other.to_string()),
     };
-    if !bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+    if !bytes.starts_with(&SIGNATURE) {
         return Err(bad("byte 0", "not an OpenEXR file".into()));
     }
     let reader = block::read(Cursor::new(bytes), false).map_err(|error| library("header", error))?;

@@ -29,7 +29,13 @@ pub struct Map {
 /// [`Fault::Broken`] for a file that is neither, or broken; [`Fault::Unsupported`] for pixels of another kind;
 /// [`Fault::TooLarge`] for more texels.
 pub fn decode(bytes: &[u8]) -> Result<Map> {
-    if bytes.starts_with(SIGNATURE) { decode_radiance(bytes) } else { crate::exr::decode(bytes, MAX_TEXELS) }
+    if bytes.starts_with(SIGNATURE) {
+        decode_radiance(bytes)
+    } else if bytes.starts_with(&crate::exr::SIGNATURE) {
+        crate::exr::decode(bytes, MAX_TEXELS)
+    } else {
+        Err(broken("byte 0: neither an OpenEXR nor a Radiance file"))
+    }
 }
 
 /// A Radiance file: its values divided by its EXPOSURE, which is what they were multiplied by (Ward, "Radiance File

@@ -69,6 +69,12 @@ pub fn instance() -> wgpu::Instance {
     wgpu::Instance::new(descriptor)
 }
 
+fn keep_first(slot: &Mutex<Option<String>>, what: String) {
+    if let Ok(mut slot) = slot.lock() {
+        slot.get_or_insert(what);
+    }
+}
+
 impl Gpu {
     /// A device without a window: the first GPU, or a software adapter where there is none.
     ///
@@ -117,11 +123,6 @@ impl Gpu {
             .await
             .map_err(|e| Error::NoAdapter(e.to_string()))?;
         let failure = Arc::new(Mutex::new(None));
-        let keep_first = |slot: &Mutex<Option<String>>, what: String| {
-            if let Ok(mut slot) = slot.lock() {
-                slot.get_or_insert(what);
-            }
-        };
         let on_error = failure.clone();
         device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| keep_first(&on_error, e.to_string())));
         let on_loss = failure.clone();
@@ -178,6 +179,13 @@ impl Gpu {
         match self.failure.lock() {
             Ok(slot) => slot.as_ref().map_or(Ok(()), |what| Err(Error::Device(what.clone()))),
             Err(_) => Err(Error::Device("an error handler panicked".into())),
+        }
+    }
+
+    /// Has [`Gpu::check`] fail from now on, for this reason if there was none before.
+    fn note_failure(&self, error: &Error) {
+        if let Error::Device(what) = error {
+            keep_first(&self.failure, what.clone());
         }
     }
 

@@ -114,7 +114,8 @@ impl Gpu {
             }
         });
         self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| Error::Device(e.to_string()))?;
-        Mapped(slot).await?;
+        // A map fails where the device is lost, maybe before the device says so: nobody shall take it for a good one meanwhile.
+        Mapped(slot).await.inspect_err(|error| self.note_failure(error))?;
         self.check()?;
         let bytes = staging.get_mapped_range(..).map_err(|e| Error::Device(format!("{e:?}")))?.to_vec();
         // On the web it would otherwise lie about until a garbage collection.

@@ -249,6 +249,11 @@ impl Viewer {
         self.renderer.begin_frame().js()
     }
 
+    /// As [`Viewer::begin`], for a frame of which is kept what its passes write: see [`Viewer::dissection`].
+    pub fn begin_dissected(&mut self) -> JsResult<usize> {
+        self.renderer.begin_dissected_frame().js()
+    }
+
     /// Makes the next of these pipelines. Resolves when the device has compiled it.
     pub fn make_pipeline(&mut self) -> js_sys::Promise {
         let made = self.renderer.make_pipeline();
@@ -260,7 +265,7 @@ impl Viewer {
 
     /// Ends the frame that was begun, and presents it.
     pub fn finish(&mut self) -> JsResult<()> {
-        self.renderer.finish_frame().js()?;
+        self.dissection = self.renderer.finish_frame().js()?;
         self.blit.present(self.renderer.gpu(), self.renderer.film()).js()
     }
 
@@ -340,16 +345,12 @@ impl Viewer {
         )
     }
 
-    /// Renders one frame, presents it, and keeps what its passes wrote. JSON: `id` of each pass, its `file` in shaders/, and whether it
-    /// `has_picture`.
-    pub fn dissect(&mut self) -> JsResult<String> {
-        let dissection = self.renderer.dissect_frame().js()?;
-        self.present()?;
-        let stages: Vec<_> = dissection.stages.iter().map(|stage| {
+    /// The passes of the last frame, if that was taken apart, as JSON: the `id` of each, its `file` in shaders/, and whether it `has_picture`.
+    pub fn dissection(&self) -> String {
+        let stages = self.dissection.iter().flat_map(|dissection| &dissection.stages).map(|stage| {
             serde_json::json!({"id": stage.shader.id, "file": stage.shader.file, "has_picture": stage.has_picture()})
-        }).collect();
-        self.dissection = Some(dissection);
-        Ok(serde_json::json!(stages).to_string())
+        });
+        stages.collect::<serde_json::Value>().to_string()
     }
 
     /// The picture of a pass of that frame: RGBA8, row-major from the top; empty where it has none.

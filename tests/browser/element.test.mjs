@@ -125,6 +125,7 @@ test('a wrong name or value is one message and one event with a code, and the pi
       ['camera', 'bogus', 'UNKNOWN_NAME', /bogus/, '0'],
       ['camera', '1,2', 'BAD_VALUE', /nine numbers/, '0'],
       ['seed', '-1', 'BAD_VALUE', /seed/, '0'],
+      ['time', 'noon', 'BAD_VALUE', /noon/, '0'],
       ['scale', '9', 'BAD_VALUE', /scale/, '1'],
       ['src', 'missing.glb', 'IO', /missing\.glb: the server says 404/, 'builtin:cornell'],
       ['src', 'builtin:bogus', 'UNKNOWN_NAME', /bogus/, 'builtin:cornell'],
@@ -210,6 +211,19 @@ test('out of view nothing is given to the GPU, and removal ends it', () =>
     },
   ));
 
+/** Keeps the devices of the page, for tests to destroy. One that a page destroys is lost for the reason `destroyed`, which the renderer takes for its own doing. */
+const destructible = () => {
+  window.devices = [];
+  const { requestDevice } = GPUAdapter.prototype;
+  GPUAdapter.prototype.requestDevice = async function (...given) {
+    const device = await requestDevice.apply(this, given);
+    const lost = device.lost.then(async ({ message }) => ({ reason: await device.tell?.() ?? 'unknown', message: message || 'destroyed' }));
+    Object.defineProperty(device, 'lost', { value: lost });
+    window.devices.push(device);
+    return device;
+  };
+};
+
 // Firefox goes on silently with a device that the page has destroyed: `lost` is not told to the module.
 const onlyChromium = { skip: browserName !== 'chromium' };
 
@@ -235,19 +249,42 @@ test('a destroyed device is replaced, and after a second one the viewer gives up
       assert.match(failure.shown, /device was lost/);
       assert.equal(await page.evaluate(() => document.querySelector('restir-viewer').viewer.reset().catch(({ code }) => code)), 'DEVICE');
     },
-    () => {
-      // A device that a page destroys is lost for the reason `destroyed`, which the renderer takes for its own doing.
-      window.devices = [];
-      const { requestDevice } = GPUAdapter.prototype;
-      GPUAdapter.prototype.requestDevice = async function (...given) {
-        const device = await requestDevice.apply(this, given);
-        const lost = device.lost.then(({ message }) => ({ reason: 'unknown', message: message || 'destroyed' }));
-        Object.defineProperty(device, 'lost', { value: lost });
-        window.devices.push(device);
-        return device;
-      };
-    },
+    destructible,
   ));
+
+test('a device that fails before it says that it is lost is replaced as well', onlyChromium, () =>
+  withElement(
+    'src="builtin:cornell" technique="normals" max-samples="3"',
+    async (page) => {
+      await untilFrames(page, 3);
+      await page.evaluate(() => {
+        // It never says so.
+        devices.at(-1).tell = () => new Promise(() => undefined);
+        devices.at(-1).destroy();
+        void document.querySelector('restir-viewer').viewer.reset();
+      });
+      assert.equal((await told(page, 'devicelost')).final, false);
+      await told(page, 'restored');
+      await untilFrames(page, 3);
+      assert.equal(await page.evaluate(() => devices.length), 2);
+    },
+    destructible,
+  ));
+
+test('a moment that is none is told, and the picture comes; a message goes when another scene is there', () =>
+  withElement('src="builtin:motion" technique="normals" max-samples="1" time="noon"', async (page) => {
+    await untilFrames(page, 1);
+    const words = () => page.evaluate(() => {
+      const { hidden, textContent } = document.querySelector('restir-viewer').shadowRoot.querySelector('p');
+      return hidden ? '' : textContent;
+    });
+    assert.match(await words(), /time=noon/);
+    await page.evaluate(() => document.querySelector('restir-viewer').viewer.load('missing.glb').catch(() => undefined));
+    assert.match(await words(), /missing\.glb/);
+    await page.evaluate(() => document.querySelector('restir-viewer').viewer.load('builtin:cornell'));
+    await untilFrames(page, 1);
+    assert.equal(await words(), '');
+  }));
 
 test('several viewers share one wasm module; labels, poster and pixels', () =>
   withHtml(

@@ -159,6 +159,11 @@ test('a picture of one pixel is taken apart as well, and ends when frames go on'
     await page.keyboard.press('t');
     await page.waitForSelector('#steps:not([hidden])');
     assert.deepEqual(await page.$eval('#passed', ({ width, height }) => [width, height]), [1, 1]);
+    // There is room for one panel.
+    await page.keyboard.press('i');
+    await page.waitForFunction(() => document.getElementById('steps').hidden && !document.getElementById('inspector').hidden, { polling: 50 });
+    await page.keyboard.press('t');
+    await page.waitForFunction(() => document.getElementById('inspector').hidden && !document.getElementById('steps').hidden, { polling: 50 });
     await page.keyboard.press(' ');
     await page.waitForFunction(() => document.getElementById('steps').hidden, { polling: 50 });
     assert.equal(await page.$eval('#message', ({ hidden }) => hidden), true);

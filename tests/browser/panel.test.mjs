@@ -187,6 +187,38 @@ test('errors against a reference are those of the command line, are drawn, and e
     assert.equal(await told(), '');
   }));
 
+test('a reference is of one view and one moment', () =>
+  open('?scene=motion&technique=normals&render.pixel_filter=center&size=24x16&frames=4&accumulate=yes&time=0.5', async (page) => {
+    const words = (part) => page.waitForFunction((wanted) => document.getElementById('errors-words').textContent.includes(wanted), { polling: 50 }, part);
+    const measured = () => page.waitForFunction(() => document.getElementById('errors-table').innerText.includes('0.00e+0'), { polling: 50 });
+    await waitForFrames(page, 4);
+    await unfold(page, 'errors');
+    await page.click('#keep-reference');
+    await measured();
+    await page.select('#difference', 'flip');
+    await page.waitForFunction(() => document.getElementById('difference-words').textContent.includes('mean 0.0000'), { polling: 50 });
+    await page.select('#view', 'albedo');
+    await words('The reference shows radiance, the picture albedo');
+    assert.equal(await page.$eval('#errors-table', (table) => table.innerText), '');
+    await page.waitForFunction(() => document.getElementById('difference-words').textContent.includes('shows albedo'), { polling: 50 });
+    await page.select('#view', 'radiance');
+    await page.waitForFunction(() => document.getElementById('errors-words').textContent === '', { polling: 50 });
+    await measured();
+    await page.$eval('#scrub', (slider) => {
+      slider.value = '0.75';
+      slider.dispatchEvent(new Event('input'));
+    });
+    await words('keep a new reference');
+    assert.equal(await page.$eval('#errors-table', (table) => table.innerText), '');
+  }));
+
+test('what an address says of a second picture and cannot be is a warning, too', () =>
+  open(`?scene=cornell&technique=normals&size=16x16&frames=1&b=${encodeURIComponent('technique=bogus&seed=x&film.exposure=loud')}`, async (page) => {
+    await page.waitForFunction(() => document.querySelectorAll('#warnings li').length === 3, { polling: 50 });
+    const told = await page.$$eval('#warnings li', (items) => items.map(({ textContent }) => textContent).sort());
+    for (const [at, name] of ['film.exposure=loud', 'seed=x', 'technique=bogus'].entries()) assert.match(told[at], new RegExp(`^picture B: ${name} in the address: `));
+  }));
+
 test('two pictures side by side: their own settings, one camera, a divider, and a link that holds both', () =>
   open('?scene=cornell&technique=normals&size=24x16&frames=2&render.pixel_filter=center', async (page) => {
     const second = (tab) =>
@@ -309,4 +341,13 @@ test('a view of a number has a legend with its colours and ends, which can be fi
     assert.equal(await page.$eval('#legend-own', (button) => button.disabled), true);
     await page.select('#view', 'radiance');
     await page.waitForFunction(() => document.getElementById('legend').hidden, { polling: 50 });
+    // The window that a furnace is: nothing to spread colours over.
+    await page.select('#scene', 'furnace');
+    await page.waitForFunction(() => location.search.includes('scene=furnace'), { polling: 50 });
+    await waitForFrames(page, 1);
+    await page.select('#view', 'not finite');
+    await page.waitForFunction(() => !document.getElementById('legend').hidden, { polling: 50 });
+    await waitForFrames(page, 1);
+    await page.click('#legend-fit');
+    await page.waitForFunction(() => /alike/.test(document.getElementById('legend').innerText), { polling: 50 });
   }));

@@ -286,3 +286,29 @@ test('where the browser records no video it says so', () =>
     },
     () => delete window.MediaRecorder,
   ));
+
+test('a recording is cancelled within a picture, and another scene need not wait for it', () =>
+  withPage(site, '?scene=motion&technique=normals&scale=0.1', async (page) => {
+    await unfold(page, 'recording');
+    const words = (part) => page.waitForFunction((wanted) => document.getElementById('record-words').textContent.includes(wanted), { polling: 50 }, part);
+    const begin = async () => {
+      for (const [id, count] of [['record-count', 2], ['record-samples', 65536]]) await fill(page, id, String(count));
+      await page.click('#record-pictures');
+      await words('Picture 1 of 2');
+    };
+    await begin();
+    await page.click('#record-pictures');
+    await words('Cancelled.');
+    const isOver = () => page.waitForFunction(() => document.getElementById('record-pictures').textContent !== 'Cancel', { polling: 50 });
+    await isOver();
+    await begin();
+    // The pictures keep their size, which is no choice that the address tells.
+    await page.setViewport({ width: 700, height: 420 });
+    await new Promise((resolve) => setTimeout(resolve, 500));
+    assert.doesNotMatch(page.url(), /size=/);
+    await page.select('#scene', 'furnace');
+    await isOver();
+    await page.waitForFunction(() => location.search.includes('scene=furnace'), { polling: 50 });
+    await waitForFrames(page, 1);
+    assert.equal(await page.$eval('#message', ({ hidden }) => hidden), true);
+  }));
