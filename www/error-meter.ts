@@ -1,7 +1,7 @@
 // How far the picture is from a reference that the user kept: figures, curves against frames or time, and CSV.
 import type { Errors } from './api.js';
 import { save } from './files.js';
-import type { Picture } from './measure.js';
+import { type Picture, errorsOf } from './measure.js';
 import { byId } from './notices.js';
 import { svgElement } from './elements.js';
 import type { RestirViewer, Sample } from './viewer.js';
@@ -93,7 +93,9 @@ class Track {
     const curve = this.curves.at(-1) ?? this.begin();
     try {
       // Between two frames: of the picture that this sample is of.
-      const errors = await this.view.errors(reference);
+      const picture = await this.view.readPicture();
+      if (picture.view !== reference.view) return;
+      const errors = await errorsOf(picture, reference);
       if (this.reference() !== reference) return;
       // Frames that are not averaged are each a picture of their own.
       curve.readings = this.view.accumulating ? [...curve.readings, { ...reading, ...errors }] : [{ ...reading, ...errors }];
