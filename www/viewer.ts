@@ -1,9 +1,8 @@
 // A scene on a canvas: loads it, renders it, moves its camera, and starts again when the device is lost. Knows no page.
 import { findAdapter } from './adapter.js';
 import type { BiasNote, Camera, Description, DissectedPass, Errors, Failure, Inspection, Memory, Pose, SceneReport, Stats, ViewLegend } from './api.js';
-import { OrbitCamera } from './camera.js';
 import { Controls } from './controls.js';
-import { description, isDefault, normalised, parameterOf, techniqueOf } from './description.js';
+import { description, parameterOf } from './description.js';
 import { sharedDevice } from './device.js';
 import { Fade } from './fade.js';
 import { readDropped, sourceOf, surroundingsOf } from './files.js';
@@ -16,6 +15,8 @@ import { Viewer } from './pkg/restir.js';
 import type { Choice, Contents, SceneSource, Surroundings } from './protocol.js';
 import { RenderLoop, renderFrame } from './render-loop.js';
 import { Resolution, defaultBudget, longestSide } from './resolution.js';
+import { SceneCamera } from './scene-camera.js';
+import { SettingsTaker } from './settings-taker.js';
 import { type Settings, defaultSettings, writeQuery } from './url-state.js';
 import type { Change, LoadOptions, Scene, ViewerEventMap } from './viewer-events.js';
 import { compileWasm, startWasm } from './wasm.js';
@@ -60,7 +61,8 @@ export class RestirViewer extends EventTarget {
   /** What determines the picture: to be read, and changed by the methods. */
   readonly settings: Settings;
   private readonly loader = new SceneLoader();
-  private readonly orbit = new OrbitCamera();
+  private readonly taker: SettingsTaker;
+  private readonly sight: SceneCamera;
   private readonly resolution: Resolution;
   private readonly fade: Fade;
   private readonly loop = new RenderLoop({
@@ -95,6 +97,8 @@ export class RestirViewer extends EventTarget {
   constructor(private readonly canvas: HTMLCanvasElement, settings: Partial<Settings> = {}) {
     super();
     this.settings = { ...defaultSettings(), ...settings, values: new Map(settings.values) };
+    this.taker = new SettingsTaker(this.settings, (failure) => this.emit('error', failure));
+    this.sight = new SceneCamera(this.settings, () => this.shown);
     this.resolution = new Resolution(canvas);
     this.fade = new Fade(canvas);
     this.takeLimits();
@@ -157,7 +161,7 @@ export class RestirViewer extends EventTarget {
       const all = { ...settings, values: new Map(settings.values) };
       if (settled && this.isOf(settings, files)) {
         await this.loop.change((viewer) => {
-          this.forgetValues(viewer);
+          this.taker.forgetValues(viewer);
           Object.assign(this.settings, all);
           this.takeSettings(viewer);
           this.takeView(viewer);
@@ -210,34 +214,20 @@ export class RestirViewer extends EventTarget {
 
   /** Switches to another technique, with its own defaults; the renderer's and film's parameters stay. Rejects with `UNKNOWN_NAME`. */
   setTechnique(id: string): Promise<void> {
-    return this.set('technique', id, (viewer) => this.takeTechnique(viewer, id));
+    return this.set('technique', id, (viewer) => this.taker.takeTechnique(viewer, id));
   }
 
   /** Switches to a preset: its technique, and the renderer's parameters as it says; the film's stay. Rejects with `UNKNOWN_NAME`. */
   setPreset(id: string): Promise<void> {
     return this.set('preset', id, (viewer) => {
-      const preset = description().presets.find((known) => known.id === id);
-      if (!preset) throw { code: 'UNKNOWN_NAME', message: `there is no preset ${id}` };
-      const { values } = this.settings;
-      for (const key of [...values.keys()].filter((name) => name.startsWith('render.'))) {
-        viewer.set(key, String(parameterOf(preset.technique, key)?.default));
-        values.delete(key);
-      }
-      this.takeTechnique(viewer, preset.technique);
-      for (const [key, value] of Object.entries(preset.settings)) {
-        viewer.set(key, value);
-        values.set(key, value);
-      }
+      this.taker.takePreset(viewer, id);
       viewer.set_accumulate(this.accumulating);
     });
   }
 
   /** The preset whose settings these are; undefined where something else is set, but for how the film is shown. */
   get preset(): string | undefined {
-    const { technique, values } = this.settings;
-    const own = [...values].filter(([key]) => !key.startsWith('film.'));
-    const same = (settings: Record<string, string>) => own.length === Object.keys(settings).length && own.every(([key, value]) => settings[key] === value);
-    return description().presets.find((preset) => preset.technique === technique && same(preset.settings))?.id;
+    return this.taker.preset;
   }
 
   /**
@@ -247,7 +237,7 @@ export class RestirViewer extends EventTarget {
     const work = (viewer: Viewer) => {
       const parameter = parameterOf(this.settings.technique, name);
       if (value === undefined && !parameter) return void this.settings.values.delete(name);
-      this.takeValue(viewer, name, String(value ?? parameter?.default));
+      this.taker.takeValue(viewer, name, String(value ?? parameter?.default));
       // Whether time runs may hang on it: an environment that turns moves.
       if (name.startsWith('render.')) viewer.set_accumulate(this.accumulating);
     };
@@ -279,8 +269,8 @@ export class RestirViewer extends EventTarget {
     return this.reported(() =>
       this.loop.change((viewer) => {
         if (moving) this.resolution.move();
-        if (typeof camera === 'object') this.takePose(viewer, camera);
-        else this.followCamera(viewer, String(camera));
+        if (typeof camera === 'object') this.sight.stand(viewer, camera);
+        else this.sight.follow(viewer, String(camera));
         this.emit('camera-change', this.camera());
       }),
     );
@@ -295,23 +285,20 @@ export class RestirViewer extends EventTarget {
         const { surface } = JSON.parse((await viewer.inspection()) as string) as Inspection;
         viewer.inspect(Uint32Array.from(this.isInside(this.inspected) ? this.inspected : []));
         if (!surface) return;
-        this.orbit.focus(surface.position);
-        const camera = this.camera();
-        viewer.set_camera(JSON.stringify(camera));
-        this.settings.pose = camera;
-        this.emit('camera-change', camera);
+        this.sight.orbit.focus(surface.position);
+        this.emit('camera-change', this.sight.move(viewer));
       }),
     );
   }
 
   /** The camera of the picture. */
   camera(): Camera {
-    return this.orbit.toCamera();
+    return this.sight.orbit.toCamera();
   }
 
   /** Index of the scene's camera that was chosen last. */
   get cameraIndex(): number {
-    return this.indexOfCamera(this.settings.camera) ?? 0;
+    return this.sight.index;
   }
 
   /** Goes to a moment of the scene, in seconds. */
@@ -418,7 +405,7 @@ export class RestirViewer extends EventTarget {
     }
     if (!this.input) {
       const end = new AbortController();
-      this.input = { controls: new Controls(this.canvas, this.orbit, end.signal), end };
+      this.input = { controls: new Controls(this.canvas, this.sight.orbit, end.signal), end };
       const focus = ({ clientX, clientY }: MouseEvent) => {
         const pixel = pixelAt(this.canvas, this.rendered, clientX, clientY);
         if (pixel) void this.focus(...pixel);
@@ -703,24 +690,6 @@ export class RestirViewer extends EventTarget {
     return this.reported(() => (onlyFilm ? this.loop.call(apply) : this.loop.change(apply)));
   }
 
-  private takeValue(viewer: Viewer, key: string, value: string): void {
-    const { technique, values } = this.settings;
-    const parameter = parameterOf(technique, key);
-    viewer.set(key, value);
-    const text = normalised(parameter, value);
-    if (parameter && isDefault(parameter, text)) values.delete(key);
-    else values.set(key, text);
-  }
-
-  private takeTechnique(viewer: Viewer, id: string): void {
-    const { settings } = this;
-    viewer.set_technique(id);
-    settings.technique = id;
-    for (const key of [...settings.values.keys()].filter((name) => !name.includes('.'))) settings.values.delete(key);
-    if (!techniqueOf(id)?.views.some(({ name }) => name === settings.view)) settings.view = 'radiance';
-    viewer.set_view(settings.view);
-  }
-
   private source(): SceneSource {
     const { source } = this.wanted ?? this.shown ?? {};
     if (!source) throw invalid('There is no scene yet.');
@@ -792,7 +761,7 @@ export class RestirViewer extends EventTarget {
 
   private async replaceScene(viewer: Viewer, flat: Uint8Array, view: View | undefined, take: (viewer: Viewer) => void): Promise<void> {
     await viewer.load(flat);
-    if (view?.values) this.forgetValues(viewer);
+    if (view?.values) this.taker.forgetValues(viewer);
     // What runs goes on from where it is.
     if (view) Object.assign(this.settings, { camera: '0', pose: undefined, time: 0, animation: '0' }, view);
     else if (!this.accumulating) this.settings.time = this.moment;
@@ -833,16 +802,6 @@ export class RestirViewer extends EventTarget {
     this.viewer = undefined;
   }
 
-  /** Runs `work`; where it throws, says so and goes on with what `drop` puts in its place. */
-  private attempt(setting: string, work: () => void, drop: () => void): void {
-    try {
-      work();
-    } catch (error) {
-      this.emit('error', { ...toFailure(error), setting });
-      drop();
-    }
-  }
-
   /** Whether the scene of these settings is shown. */
   private isOf(wanted: Settings, files: Pick<Scene, 'source' | 'surroundings'> | undefined): boolean {
     const { shown, settings } = this;
@@ -853,32 +812,16 @@ export class RestirViewer extends EventTarget {
     return sceneOf(settings) === sceneOf(wanted);
   }
 
-  /** Sets the film's and the renderer's parameters back to their defaults; a technique's are when it is chosen. */
-  private forgetValues(viewer: Viewer): void {
-    const { technique, values } = this.settings;
-    for (const key of values.keys()) if (key.includes('.')) viewer.set(key, String(parameterOf(technique, key)?.default));
-  }
-
   private takeLimits(): void {
     const { size, scale, budget, frames } = this.settings;
     Object.assign(this.resolution, { fixedSize: size, fixedScale: scale, budget: budget ?? defaultBudget });
     this.loop.frameLimit = frames ?? Infinity;
   }
 
-  /** Gives a viewer all settings, and keeps their values as the viewer writes them. */
+  /** Gives a viewer all that says how its pictures are made. */
   private takeSettings(viewer: Viewer): void {
-    const { settings } = this;
     this.takeLimits();
-    const standard = defaultSettings();
-    this.attempt(`technique=${settings.technique}`, () => viewer.set_technique(settings.technique), () => {
-      settings.technique = standard.technique;
-      viewer.set_technique(standard.technique);
-    });
-    for (const [key, value] of [...settings.values]) {
-      this.attempt(`${key}=${value}`, () => this.takeValue(viewer, key, value), () => settings.values.delete(key));
-    }
-    this.attempt(`view=${settings.view}`, () => viewer.set_view(settings.view), () => (settings.view = standard.view));
-    viewer.set_seed(settings.seed);
+    this.taker.takeAll(viewer);
   }
 
   /** Gives the viewer of a new scene its moment and its camera. */
@@ -886,52 +829,19 @@ export class RestirViewer extends EventTarget {
     const { settings } = this;
     if (settings.animation !== '0') {
       const { animation } = settings;
-      this.attempt(`animation=${animation}`, () => viewer.set_animation(animation), () => (settings.animation = '0'));
+      this.taker.attempt(`animation=${animation}`, () => viewer.set_animation(animation), () => (settings.animation = '0'));
     }
     viewer.set_speed(settings.speed);
     viewer.set_time(settings.time);
     viewer.set_accumulate(this.accumulating);
-    const first = () => this.followCamera(viewer, '0');
+    const first = () => this.sight.follow(viewer, '0');
     const { pose, camera } = settings;
-    if (pose) this.attempt('pose', () => this.takePose(viewer, pose), first);
-    else if (this.shown?.cameras.length) this.attempt(`camera=${camera}`, () => this.followCamera(viewer, camera), first);
-  }
-
-  // Cameras
-
-  private indexOfCamera(camera: string): number | undefined {
-    const cameras = this.shown?.cameras ?? [];
-    const index = Number(camera || NaN);
-    const found = cameras[index] ? index : cameras.findIndex(({ name }) => name === camera);
-    return found >= 0 ? found : undefined;
-  }
-
-  private followCamera(viewer: Viewer, camera: string): void {
-    const index = this.indexOfCamera(camera);
-    if (index === undefined) {
-      const names = (this.shown?.cameras ?? []).map(({ name }, at) => name || at).join(', ');
-      throw { code: 'UNKNOWN_NAME', message: `the scene has no camera ${camera}; there are: ${names}` };
-    }
-    viewer.follow_camera(index);
-    Object.assign(this.settings, { camera, pose: undefined });
-    this.orbit.set(JSON.parse(viewer.camera()) as Camera, viewer.bounds());
-  }
-
-  /** Looks from `pose` through the lens of the chosen camera. */
-  private takePose(viewer: Viewer, pose: Pose): void {
-    const posed: Camera = { ...(this.shown?.cameras[this.cameraIndex] ?? { vertical_fov: 0.8 }), ...pose };
-    viewer.set_camera(JSON.stringify(posed));
-    this.settings.pose = pose;
-    this.orbit.set(posed, viewer.bounds());
+    if (pose) this.taker.attempt('pose', () => this.sight.stand(viewer, pose), first);
+    else if (this.shown?.cameras.length) this.taker.attempt(`camera=${camera}`, () => this.sight.follow(viewer, camera), first);
   }
 
   private isInside(pixel: [number, number] | undefined): pixel is [number, number] {
     return pixel !== undefined && pixel[0] < this.rendered[0] && pixel[1] < this.rendered[1];
-  }
-
-  /** Whether the picture is seen through a camera that moves by itself. */
-  private followsCamera(): boolean {
-    return this.settings.pose === undefined && (this.shown?.report.moving_cameras.includes(this.cameraIndex) ?? false);
   }
 
   // Frames
@@ -941,10 +851,7 @@ export class RestirViewer extends EventTarget {
     if (moved) {
       this.resolution.move();
       this.fade.end();
-      const camera = this.camera();
-      viewer.set_camera(JSON.stringify(camera));
-      this.settings.pose = camera;
-      this.emit('camera-change', camera);
+      this.emit('camera-change', this.sight.move(viewer));
     }
     const [width, height] = this.resolution.size();
     const resized = width !== this.rendered[0] || height !== this.rendered[1];
@@ -978,8 +885,7 @@ export class RestirViewer extends EventTarget {
     this.resolution.observe(milliseconds);
     this.fade.begin();
     this.moment = viewer.time();
-    // The user takes over from where the camera is.
-    if (this.followsCamera()) this.orbit.set(JSON.parse(viewer.camera()) as Camera, viewer.bounds());
+    this.sight.catchUp(viewer);
     const [width, height] = this.rendered;
     this.emit('sample', { count: viewer.frames(), milliseconds, width, height, time: this.moment, complete: this.loop.isComplete(viewer) });
   }

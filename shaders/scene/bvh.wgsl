@@ -157,7 +157,23 @@ fn unpack_planes(word: u32) -> vec4f {
     return vec4f(unpack4xU8(word));
 }
 
-// The next thing to do; the stack keeps (node, child), for the child itself is read only when its turn comes.
+// What the stack keeps of a child of a node: which one it is, for it is read only when its turn comes. In software the child
+// itself, read with the node: there a texel more costs less than the code that reads it later.
+fn bvh_entry(node: u32, boxes: NodeBoxes, child: u32) -> u32 {
+    if is_software {
+        return boxes.children[child];
+    }
+    return (node << 2u) | child;
+}
+
+fn bvh_child(entry: u32) -> u32 {
+    if is_software {
+        return entry;
+    }
+    return load_child(entry);
+}
+
+// The next thing to do.
 fn bvh_pop(stack: ptr<function, array<u32, BVH_STACK>>, depth: ptr<function, u32>) -> u32 {
     if *depth == 0u {
         return DONE;
@@ -167,7 +183,7 @@ fn bvh_pop(stack: ptr<function, array<u32, BVH_STACK>>, depth: ptr<function, u32
     if scene_has_instances && entry == LEAVE {
         return LEAVE;
     }
-    return load_child(entry);
+    return bvh_child(entry);
 }
 
 // Of numbers of which none is NaN: in a browser the built-in functions take care of those, lane by lane where there is no GPU.
@@ -231,20 +247,19 @@ fn bvh_visit(
     if first >= none {
         return bvh_pop(stack, depth);
     }
-    let here = node << 2u;
     if fourth < none {
-        (*stack)[*depth] = here | (fourth & 3u);
+        (*stack)[*depth] = bvh_entry(node, boxes, fourth & 3u);
         *depth += 1u;
     }
     if third < none {
-        (*stack)[*depth] = here | (third & 3u);
+        (*stack)[*depth] = bvh_entry(node, boxes, third & 3u);
         *depth += 1u;
     }
     if second < none {
-        (*stack)[*depth] = here | (second & 3u);
+        (*stack)[*depth] = bvh_entry(node, boxes, second & 3u);
         *depth += 1u;
     }
-    return load_child(here | (first & 3u));
+    return bvh_child(bvh_entry(node, boxes, first & 3u));
 }
 
 // A ray on its way through the tree.

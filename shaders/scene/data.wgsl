@@ -14,11 +14,12 @@ fn data_texel(index: u32) -> vec2u {
     return vec2u(index & ((1u << DATA_ROW_BITS) - 1u), index >> DATA_ROW_BITS);
 }
 
-// Where a node's boxes lie, and how they are written down.
+// Where a node's boxes lie, and how they are written down; in software its children, too.
 struct NodeBoxes {
     grid: vec4u,
     planes_0: vec4u,
     planes_1: vec4u,
+    children: vec4u,
 }
 
 // Four texels a node, which a row holds in full.
@@ -29,16 +30,13 @@ fn node_texel(node: u32, texel: u32) -> vec4u {
 
 fn load_boxes(node: u32) -> NodeBoxes {
     if is_software {
-        return NodeBoxes(node_texel(node, 0u), node_texel(node, 1u), node_texel(node, 2u));
+        return NodeBoxes(node_texel(node, 0u), node_texel(node, 1u), node_texel(node, 2u), node_texel(node, 3u));
     }
-    return NodeBoxes(nodes[node].grid, nodes[node].planes_0, nodes[node].planes_1);
+    return NodeBoxes(nodes[node].grid, nodes[node].planes_0, nodes[node].planes_1, vec4u(0u));
 }
 
 // The reference to child `entry & 3` of node `entry >> 2`.
 fn load_child(entry: u32) -> u32 {
-    if is_software {
-        return textureLoad(node_texels, data_texel(entry | 3u), 0)[entry & 3u];
-    }
     return nodes[entry >> 2u].children[entry & 3u];
 }
 
