@@ -157,13 +157,13 @@ fn unpack_planes(word: u32) -> vec4f {
     return vec4f(unpack4xU8(word));
 }
 
-// What the stack keeps of a child of a node: which one it is, for it is read only when its turn comes. In software the child
+// What the stack keeps of a child of the node `here >> 2`: which one it is, for it is read only when its turn comes. In software the child
 // itself, read with the node: there a texel more costs less than the code that reads it later.
-fn bvh_entry(node: u32, boxes: NodeBoxes, child: u32) -> u32 {
+fn bvh_entry(here: u32, boxes: NodeBoxes, child: u32) -> u32 {
     if is_software {
         return boxes.children[child];
     }
-    return (node << 2u) | child;
+    return here | child;
 }
 
 fn bvh_child(entry: u32) -> u32 {
@@ -247,19 +247,20 @@ fn bvh_visit(
     if first >= none {
         return bvh_pop(stack, depth);
     }
+    let here = node << 2u;
     if fourth < none {
-        (*stack)[*depth] = bvh_entry(node, boxes, fourth & 3u);
+        (*stack)[*depth] = bvh_entry(here, boxes, fourth & 3u);
         *depth += 1u;
     }
     if third < none {
-        (*stack)[*depth] = bvh_entry(node, boxes, third & 3u);
+        (*stack)[*depth] = bvh_entry(here, boxes, third & 3u);
         *depth += 1u;
     }
     if second < none {
-        (*stack)[*depth] = bvh_entry(node, boxes, second & 3u);
+        (*stack)[*depth] = bvh_entry(here, boxes, second & 3u);
         *depth += 1u;
     }
-    return bvh_child(bvh_entry(node, boxes, first & 3u));
+    return bvh_child(bvh_entry(here, boxes, first & 3u));
 }
 
 // A ray on its way through the tree.
