@@ -43,8 +43,8 @@ function historyWords(seen: Inspection): string | undefined {
   // Domain 0 is the pixel itself; each reservoir of a pixel has domains of its own.
   const joined = of(seen, 'domain', 'temporal').filter(({ slot }) => slot === 0).slice(1);
   if (joined.length === 0) return 'No history joins: no pixel of the previous frame showed a surface like this one.';
-  const each = joined.map(({ pixel, confidence_weight: c }) => `of pixel ${pixel?.join(', ')}, one frame ago, with a confidence weight of ${short(c)}`);
-  return `The history joins ${each.join(', and ')}.`;
+  const each = joined.map(({ pixel, confidence_weight: c }) => `what pixel ${pixel?.join(', ')} kept a frame ago, with confidence weight ${short(c)}`);
+  return `History joins: ${each.join(', and ')}.`;
 }
 
 function neighbourWords(seen: Inspection): string[] {

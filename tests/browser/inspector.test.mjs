@@ -74,7 +74,7 @@ for (const [technique, passes, stage] of [
     open(`?scene=cornell-64&size=48x36&accumulate=no&technique=${technique}&indirect=false`, async (page) => {
       await page.click('#inspect');
       await page.mouse.click(560, 660);
-      await inspectorSays(page, 'was chosen', 'candidates', 'The history joins of pixel');
+      await inspectorSays(page, 'was chosen', 'candidates', 'History joins: what pixel');
       const seen = await reading(page, stage);
       assert.deepEqual(seen.passes.map(([name]) => name), passes);
       for (const [, , w, , target, estimate] of seen.passes) assert.ok(Math.abs(w * target - estimate) <= 0.02 * estimate + 1e-3, `${w} * ${target} = ${estimate}`);
