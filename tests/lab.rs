@@ -196,6 +196,7 @@ fn what_makes_no_sense_is_refused() {
             "no metric is an error",
         ),
         ("x = \"frame\"", "x = \"sweep\"", "BAD_FILE", "no sweep"),
+        ("[quick]", "[quick]\nvalues = [1]", "BAD_FILE", "quick.values"),
         ("frames = 64", "frames = 1", "BAD_FILE", "reference"),
         ("x = \"frame\"", "x = \"frame\"\nview = \"beauty\"", "BAD_FILE", "no view 'beauty'"),
         ("x = \"frame\"", "x = \"frame\"\nview = \"duplicates\"", "BAD_FILE", "path-tracer has no view"),

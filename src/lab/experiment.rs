@@ -396,6 +396,9 @@ impl Experiment {
         if !(2..=MOST_FRAMES).contains(&self.reference.frames) {
             return bad("reference.frames", format!("2 to {MOST_FRAMES} are possible"));
         }
+        if self.quick.values.is_some() && self.sweeps.is_empty() {
+            return bad("quick.values", "there is no sweep that they could shorten".into());
+        }
         if self.sweeps.len() > 2 {
             return bad("sweep", "at most two parameters are varied".into());
         }
