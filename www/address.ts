@@ -1,15 +1,15 @@
 // The page's address says what is shown. What a person chooses is an entry of its own in the browser's history, to which Back
 // returns; what slides changes the last entry.
 import type { SceneSource, Surroundings } from './protocol.js';
-import { type Settings, readQuery } from './url-state.js';
+import { type Settings, type Unread, readQuery } from './url-state.js';
 
 /** What an address asks for. */
 export interface Address {
   state: Settings;
   /** The settings of the second picture, as a query; undefined where there is none. */
   second: string | undefined;
-  /** What could not be read. */
-  warnings: string[];
+  /** What could not be read of the first one's. */
+  unread: Unread[];
 }
 
 /** Files of the user's, which no address can hold. */
@@ -23,9 +23,8 @@ export function readAddress(search: string): Address {
   const query = new URLSearchParams(search);
   const second = query.get('b') ?? undefined;
   query.delete('b');
-  const { state, warnings } = readQuery(query.toString());
-  const ofSecond = readQuery(second ?? '').warnings.map((warning) => `picture B: ${warning}`);
-  return { state, second, warnings: [...warnings, ...ofSecond] };
+  const { state, unread } = readQuery(query.toString());
+  return { state, second, unread };
 }
 
 /** Milliseconds until a change that slides is written: browsers do not let the address change as fast as a slider moves. */

@@ -79,6 +79,8 @@ class App {
   private hadScene = false;
   /** What is listed. */
   private warnings: string[] = [];
+  /** Settings of the address that were not taken, and are not listed yet. */
+  private readonly refused = [...this.query.unread];
   /** Whether the wasm module has failed. */
   private broken = false;
   private meter: ErrorMeter | undefined;
@@ -155,7 +157,7 @@ class App {
 
   private showFailure(failure: ViewerFailure): void {
     const { code, message, setting, stopped } = failure;
-    if (setting !== undefined) return void this.query.warnings.push(`${setting} in the address: ${message}`);
+    if (setting !== undefined) return void this.refused.push({ setting, message });
     // After an internal failure the wasm module is in an unknown state: only a reload is a restart.
     const restore = () => {
       for (const each of this.viewers()) if (each.stopped) void each.restore();
@@ -195,13 +197,14 @@ class App {
 
   private showWarnings(report: SceneReport): void {
     // Those of the address are told once.
-    this.warnings = [...this.query.warnings.splice(0), ...report.warnings];
-    showWarnings(this.warnings);
+    this.warnings = report.warnings;
+    this.addWarnings();
   }
 
-  /** Shows those of the address that have come since the others were shown. */
+  /** Shows what was refused since the others were shown, too. */
   private addWarnings(): void {
-    this.warnings.unshift(...this.query.warnings.splice(0));
+    const refused = this.refused.splice(0).map(({ setting, message }) => `${setting} in the address: ${message}`);
+    this.warnings = [...refused, ...this.warnings];
     showWarnings(this.warnings);
   }
 
@@ -215,7 +218,7 @@ class App {
   private async showAddress(address: Address, files: OwnFiles | undefined): Promise<void> {
     const { view, compare } = this;
     const before = view.scene;
-    this.query.warnings.push(...address.warnings);
+    this.refused.push(...address.unread);
     const showing = view.show(address.state, files);
     await this.settle(showing);
     // Gone further meanwhile, or there is nothing to compare with.
@@ -366,7 +369,11 @@ class App {
     });
     menu('target').addEventListener('change', () => this.edit(menu('target').value));
     button('compare').addEventListener('click', () => (this.compare.other ? this.compare.close() : void this.openCompare()));
-    menu('scale').addEventListener('change', () => void view.setScale(Number(menu('scale').value) || undefined));
+    menu('scale').addEventListener('change', () => {
+      // A size in pixels, as a reference sets it, goes before any scale.
+      if (view.settings.size) void view.setSize(undefined);
+      void view.setScale(Number(menu('scale').value) || undefined);
+    });
     menu('budget').addEventListener('change', () => void view.setBudget(Number(menu('budget').value) || undefined));
     view.addEventListener('param-change', ({ detail }) => ['scale', 'size'].includes(detail.name) && this.showBudget());
     const accumulate = byId('accumulate', HTMLInputElement);

@@ -1,4 +1,5 @@
 // The menu of cameras: those of the scene, and the views that a person has kept.
+import type { Pose } from './api.js';
 import { Bookmarks } from './bookmarks.js';
 import { byId, showError } from './notices.js';
 import type { RestirViewer } from './viewer.js';
@@ -12,12 +13,16 @@ export class CameraMenu {
   private readonly menu = byId('camera', HTMLSelectElement);
   private readonly row = byId('bookmark-row', HTMLElement);
   private readonly name = byId('bookmark-name', HTMLInputElement);
+  /** Where the bookmark is whose name is being typed. */
+  private naming: Pose | undefined;
 
   constructor(private readonly view: RestirViewer) {
     this.menu.addEventListener('change', () => this.go(this.menu.value));
     byId('keep-view', HTMLButtonElement).addEventListener('click', () => this.keep());
     byId('bookmark-delete', HTMLButtonElement).addEventListener('click', () => this.change((bookmarks, at) => bookmarks.remove(at)));
-    this.name.addEventListener('change', () => this.change((bookmarks, at) => bookmarks.rename(at, this.name.value.trim() || `View ${at + 1}`)));
+    this.name.addEventListener('focus', () => (this.naming = view.settings.pose));
+    this.name.addEventListener('change', () => this.rename());
+    this.name.addEventListener('blur', () => (this.naming = undefined));
     view.addEventListener('camera-change', () => this.choose());
     view.addEventListener('load', () => this.show());
   }
@@ -47,11 +52,14 @@ export class CameraMenu {
   /** Selects the entry at which the camera is. */
   private choose(): void {
     const { pose } = this.view.settings;
+    // What is being typed is the name of the view that the camera leaves.
+    const leaves = this.naming !== undefined && this.naming !== pose;
+    if (leaves) this.rename();
     const at = this.bookmarks.find(pose);
     this.menu.value = at >= 0 ? mark + String(at) : pose ? moved : String(this.view.cameraIndex);
     this.row.hidden = at < 0;
     const named = this.bookmarks.all[at]?.name;
-    if (named !== undefined && document.activeElement !== this.name) this.name.value = named;
+    if (named !== undefined && (leaves || document.activeElement !== this.name)) this.name.value = named;
   }
 
   private go(entry: string): void {
@@ -76,9 +84,19 @@ export class CameraMenu {
     view.setCamera(pose).then(() => this.show(), () => undefined);
   }
 
-  private change(work: (bookmarks: Bookmarks, at: number) => void): void {
-    const at = this.bookmarks.find(this.view.settings.pose);
-    if (at >= 0) work(this.bookmarks, at);
+  private rename(): void {
+    const { naming } = this;
+    this.naming = undefined;
+    this.change((bookmarks, at) => bookmarks.rename(at, this.name.value.trim() || `View ${at + 1}`), naming);
+  }
+
+  private change(work: (bookmarks: Bookmarks, at: number) => void, pose = this.view.settings.pose): void {
+    const at = this.bookmarks.find(pose);
+    try {
+      if (at >= 0) work(this.bookmarks, at);
+    } catch (error) {
+      showError({ code: 'STORAGE', message: (error as Error).message });
+    }
     this.show();
   }
 }

@@ -1,7 +1,7 @@
 // A second picture over the first: the same scene, camera and moment with other settings, parted by a divider that can be moved.
 // A component of its own: it lies over any canvas, of the page or in an element.
-import { type Settings, readQuery, writeQuery } from './url-state.js';
-import { type Change, RestirViewer } from './viewer.js';
+import { type Settings, isShared, readQuery, writeQuery } from './url-state.js';
+import { type Change, RestirViewer, type ViewerFailure } from './viewer.js';
 
 /** What of the settings is of a picture alone; all else is shared. */
 const own = ({ technique, view, values }: Settings): Partial<Settings> => ({ technique, view, values });
@@ -93,18 +93,14 @@ export class Compare {
   async open(query?: string): Promise<void> {
     if (this.second) return;
     const { first } = this;
-    const given = query === undefined ? own({ ...first.settings, values: new Map(first.settings.values) }) : own(readQuery(query).state);
+    const given = query === undefined ? own({ ...first.settings, values: new Map(first.settings.values) }) : this.read(query);
     const canvas = (this.canvas = make('canvas', { id: 'canvas-b', part: 'canvas', 'aria-hidden': 'true' }));
     this.under.after(canvas);
     this.divider.hidden = this.labels.hidden = false;
     const second = (this.second = new RestirViewer(canvas, { ...first.settings, ...given }));
     second.suspended = first.suspended;
     second.addEventListener('param-change', ({ detail }) => this.changed(detail));
-    // A fault of the second's is told as the first's are.
-    second.addEventListener('error', ({ detail }) => {
-      const { setting } = detail;
-      first.dispatchEvent(new CustomEvent('error', { detail: { ...detail, ...(setting !== undefined && { setting: `picture B: ${setting}` }) } }));
-    });
+    second.addEventListener('error', ({ detail }) => this.tell(detail));
     second.addEventListener('sample', ({ detail }) => this.label('b', second, detail.count));
     this.part(50);
     this.follow();
@@ -118,10 +114,23 @@ export class Compare {
     if (!this.second) return this.open(query);
     await this.following;
     const { second } = this;
-    const given = own(readQuery(query).state);
+    const given = this.read(query);
     // Without a scene, it begins with them.
     if (!second?.scene) return void (second && Object.assign(second.settings, given));
     await second.show({ ...second.settings, ...given }).catch(() => undefined);
+  }
+
+  /** What a query says of the second picture alone; what it says of both is told, and left out. */
+  private read(query: string): Partial<Settings> {
+    for (const [key, text] of new URLSearchParams(query)) {
+      if (isShared(key)) this.tell({ code: 'BAD_VALUE', message: 'both pictures share it', setting: `${key}=${text}` });
+    }
+    return own(readQuery(query).state);
+  }
+
+  /** A fault of the second's is told as the first's are. */
+  private tell({ setting, ...failure }: ViewerFailure): void {
+    this.first.dispatchEvent(new CustomEvent('error', { detail: { ...failure, ...(setting !== undefined && { setting: `picture B: ${setting}` }) } }));
   }
 
   close(): void {

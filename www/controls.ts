@@ -7,6 +7,8 @@ const turnPerHeight = 3;
 const flySpeed = 0.6;
 /** Radians per second of the arrow keys. */
 const turnSpeed = 1.5;
+/** Seconds that a key counts for at least: one that is tapped between two frames moves the camera, too. */
+const tap = 0.05;
 
 const flyKeys: Record<string, [number, number, number]> = {
   KeyW: [0, 0, 1],
@@ -29,6 +31,8 @@ export class Controls {
   mode: 'orbit' | 'fly' = 'orbit';
   private readonly pointers = new Map<number, { x: number; y: number }>();
   private readonly pressed = new Set<string>();
+  /** Pressed since the last frame, whether or not they still are. */
+  private readonly tapped = new Set<string>();
   private moved = false;
   private fast = false;
 
@@ -52,14 +56,15 @@ export class Controls {
 
   /** Applies held keys over `seconds`; returns whether the camera moved since the last call. */
   update(seconds: number): boolean {
-    const speed = seconds * (this.fast ? 4 : 1);
-    for (const code of this.pressed) {
+    for (const code of new Set([...this.pressed, ...this.tapped])) {
+      const speed = (this.tapped.has(code) ? Math.max(seconds, tap) : seconds) * (this.fast ? 4 : 1);
       const [fly, turn, zoom] = [flyKeys[code], turnKeys[code], zoomKeys[code]];
       if (fly) this.camera.fly(fly[0] * speed * flySpeed, fly[1] * speed * flySpeed, fly[2] * speed * flySpeed);
       if (turn) this.turn(turn[0] * speed * turnSpeed, turn[1] * speed * turnSpeed);
       if (zoom) this.camera.zoom(Math.exp(zoom * speed));
       this.moved = true;
     }
+    this.tapped.clear();
     const moved = this.moved;
     this.moved = false;
     return moved;
@@ -111,6 +116,8 @@ export class Controls {
     if (!isDown) this.pressed.delete(event.code);
     if (!known || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
-    if (isDown) this.pressed.add(event.code);
+    if (!isDown) return;
+    this.pressed.add(event.code);
+    if (!event.repeat) this.tapped.add(event.code);
   }
 }

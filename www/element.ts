@@ -1,8 +1,8 @@
 // <restir-viewer>: a RestirViewer as an element, told by attributes what to show.
 import { Compare } from './compare.js';
 import { explain, toFailure } from './messages.js';
-import { defaultTechnique, poseOf } from './url-state.js';
-import { type Pose, RestirViewer, type ViewerEventMap, type ViewerFailure } from './viewer.js';
+import { defaultTechnique, poseOf, timeOf } from './url-state.js';
+import { type LoadOptions, type Pose, RestirViewer, type ViewerEventMap, type ViewerFailure } from './viewer.js';
 
 export * from './viewer.js';
 
@@ -32,24 +32,21 @@ function parametersOf(text: string | null): Map<string, string> {
   }));
 }
 
-/** Nine numbers are where to stand and look; anything else names one of the scene's cameras. */
-function cameraOf(text: string | null): string | Pose {
-  if (!text?.includes(',')) return text || '0';
+/** What `read` makes of an attribute; throws `BAD_VALUE`. */
+function valueOf<T>(name: string, text: string, read: (text: string) => T): T {
   try {
-    return poseOf(text);
+    return read(text);
   } catch (error) {
-    throw { code: 'BAD_VALUE', message: `camera=${text}: ${(error as Error).message}` };
+    throw { code: 'BAD_VALUE', message: `${name}=${text}: ${(error as Error).message}` };
   }
 }
 
-const numberOf = (text: string | null) => (text === null ? undefined : Number(text));
+/** Nine numbers are where to stand and look; anything else names one of the scene's cameras. */
+const cameraOf = (text: string | null): string | Pose => (text?.includes(',') ? valueOf('camera', text, poseOf) : text || '0');
 
-/** A moment in seconds. */
-function timeOf(text: string | null): number {
-  const time = numberOf(text) ?? 0;
-  if (Number.isFinite(time)) return time;
-  throw { code: 'BAD_VALUE', message: `time=${text}: must be a number of seconds` };
-}
+const momentOf = (text: string | null) => (text === null ? 0 : valueOf('time', text, timeOf));
+
+const numberOf = (text: string | null) => (text === null ? undefined : Number(text));
 
 export interface RestirViewerElement {
   addEventListener<Type extends keyof ViewerEventMap>(
@@ -149,6 +146,7 @@ export class RestirViewerElement extends HTMLElement {
     viewer.addEventListener('load', () => {
       // What was wrong before has nothing to do with what is shown now.
       if (!this.isOfLoad) this.message.hidden = true;
+      this.isOfLoad = false;
     });
     viewer.addEventListener('sample', () => {
       this.poster.hidden = this.hasPicture = true;
@@ -206,9 +204,14 @@ export class RestirViewerElement extends HTMLElement {
     if (this.changed('alt', 'controls', 'poster')) this.applyLooks(viewer);
     if (!this.wasSeen) return;
     this.message.hidden = true;
+    this.applyScene(viewer);
+    this.applySettings(viewer);
+  }
+
+  /** Applies an attribute; what is wrong with it is told, and no reason to leave out others. */
+  private attempt(work: () => unknown): void {
     try {
-      this.applyScene(viewer);
-      this.applySettings(viewer);
+      work();
     } catch (error) {
       this.showFailure(toFailure(error));
     }
@@ -232,29 +235,25 @@ export class RestirViewerElement extends HTMLElement {
     const source = this.getAttribute('src');
     if (source === null) return;
     const camera = () => cameraOf(this.getAttribute('camera'));
-    const time = () => timeOf(this.getAttribute('time'));
+    const time = () => momentOf(this.getAttribute('time'));
     if (this.changed('src')) {
       const environment = this.getAttribute('environment');
       this.changed('environment', 'camera', 'time');
-      const problems: unknown[] = [];
-      const read = <T>(value: () => T, standard: T): T => {
-        try {
-          return value();
-        } catch (problem) {
-          problems.push(problem);
-          return standard;
-        }
-      };
-      const place = read<string | Pose>(camera, '0');
-      const loading = viewer.load(source, { environment, time: read(time, 0), ...(typeof place === 'string' ? { camera: place } : { pose: place }) });
-      loading.catch(() => (this.progress.hidden = !viewer.loading));
-      // After it has begun: they are of this load.
-      for (const problem of problems) this.showFailure(toFailure(problem));
+      const view: LoadOptions = { environment };
+      this.attempt(() => {
+        const place = camera();
+        Object.assign(view, typeof place === 'string' ? { camera: place } : { pose: place });
+      });
+      this.attempt(() => (view.time = time()));
+      // What is wrong with them is of this load, which takes older messages away.
+      const isTold = !this.message.hidden;
+      viewer.load(source, view).catch(() => (this.progress.hidden = !viewer.loading));
+      this.isOfLoad = isTold;
       return;
     }
     if (this.changed('environment')) void viewer.setEnvironment(this.getAttribute('environment'));
-    if (this.changed('camera')) void viewer.setCamera(camera());
-    if (this.changed('time')) void viewer.setTime(time());
+    if (this.changed('camera')) this.attempt(() => viewer.setCamera(camera()));
+    if (this.changed('time')) this.attempt(() => viewer.setTime(time()));
   }
 
   private applySettings(viewer: RestirViewer): void {
@@ -271,7 +270,7 @@ export class RestirViewerElement extends HTMLElement {
     if (this.changed('scale')) void viewer.setScale(numberOf(text('scale')));
     if (this.changed('budget')) void viewer.setBudget(numberOf(text('budget')));
     if (this.changed('max-samples')) void viewer.setMaxSamples(numberOf(text('max-samples')));
-    if (this.changed('params')) this.applyParameters(viewer);
+    if (this.changed('params')) this.attempt(() => this.applyParameters(viewer));
     if (this.changed('compare')) {
       const second = text('compare');
       if (second === null) this.compare?.close();

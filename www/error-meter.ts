@@ -1,10 +1,10 @@
 // How far the picture is from a reference that the user kept: figures, curves against frames or time, and CSV.
-import type { Errors } from './api.js';
+import type { Errors, Failure } from './api.js';
 import { save } from './files.js';
 import { type Picture, errorsOf } from './measure.js';
 import { byId } from './notices.js';
 import { svgElement } from './elements.js';
-import type { RestirViewer, Sample } from './viewer.js';
+import type { RestirViewer, Sample, Settings } from './viewer.js';
 
 /** One measurement. */
 interface Reading extends Errors {
@@ -101,7 +101,9 @@ class Track {
       curve.readings = this.view.accumulating ? [...curve.readings, { ...reading, ...errors }] : [{ ...reading, ...errors }];
       this.measured();
     } catch (error) {
-      if (this.reference() === reference) this.measured((error as Error).message);
+      // A lost device takes the picture, not the reference.
+      const { code, message } = error as Failure;
+      if (this.reference() === reference && code !== 'DEVICE') this.measured(message);
     } finally {
       this.measuring = false;
       const { missed } = this;
@@ -114,7 +116,6 @@ class Track {
 
 export class ErrorMeter {
   private tracks: Track[];
-  private kept: Picture | undefined;
 
   constructor(private readonly view: RestirViewer) {
     this.tracks = [this.track(view, '')];
@@ -126,7 +127,11 @@ export class ErrorMeter {
     view.addEventListener('sample', ({ detail: { time } }) => {
       if (this.kept && view.moves && time !== this.kept.time) this.forget();
     });
-    view.addEventListener('param-change', ({ detail: { name } }) => name === 'view' && this.kept && this.show());
+    view.addEventListener('param-change', () => {
+      const { size } = view.settings;
+      if (this.kept && (size?.[0] !== this.kept.width || size[1] !== this.kept.height)) this.forget();
+      else if (this.kept) this.show();
+    });
     this.show();
   }
 
@@ -140,7 +145,7 @@ export class ErrorMeter {
 
   private track(view: RestirViewer, name: string): Track {
     const track: Track = new Track(view, name, () => (this.tracks.includes(track) ? this.kept : undefined), (problem) => {
-      if (problem !== undefined) this.kept = undefined;
+      if (problem !== undefined) view.forgetReference();
       this.show(problem);
     });
     return track;
@@ -148,7 +153,6 @@ export class ErrorMeter {
 
   private async keep(): Promise<void> {
     await this.view.keepReference().catch(() => undefined);
-    this.kept = this.view.reference;
     for (const track of this.tracks) track.clear();
     await Promise.all(this.tracks.map(({ view }) => view.reset().catch(() => undefined)));
     this.show();
@@ -156,15 +160,22 @@ export class ErrorMeter {
 
   private forget(): void {
     if (!this.kept) return;
-    this.kept = undefined;
     this.view.forgetReference();
-    this.show('The camera, the moment or the scene has changed: keep a new reference.');
+    this.show('The camera, the moment, the size or the scene has changed: keep a new reference.');
   }
 
-  /** Says so where the picture shows something else than what was kept. */
-  private get otherView(): string {
-    const { view } = this.view.settings;
-    return this.kept && this.kept.view !== view ? `The reference shows ${this.kept.view}, the picture ${view}: nothing is measured meanwhile.` : '';
+  private get kept(): Picture | undefined {
+    return this.view.reference;
+  }
+
+  /** Says so where a picture shows something else than what was kept. */
+  private get otherViews(): string {
+    const others = this.tracks.flatMap(({ view: { settings } }, at) => (this.isComparable(settings) ? [] : [`picture ${'AB'[at]} ${settings.view}`]));
+    return this.kept && others.length > 0 ? `The reference shows ${this.kept.view}, ${others.join(' and ')}: that is not measured.` : '';
+  }
+
+  private isComparable({ view }: Settings): boolean {
+    return view === this.kept?.view;
   }
 
   private get curves(): Curve[] {
@@ -172,8 +183,8 @@ export class ErrorMeter {
   }
 
   private show(words = 'Let the path tracer average many frames, keep the picture, then choose what to compare with it.'): void {
-    const latest = this.tracks.map(({ curves }) => curves.at(-1)?.readings.at(-1));
-    const shown = this.kept && !this.otherView && latest.some((reading) => reading);
+    const latest = this.tracks.map(({ curves, view: { settings } }) => (this.isComparable(settings) ? curves.at(-1)?.readings.at(-1) : undefined));
+    const shown = this.kept && latest.some((reading) => reading);
     const figures: [string, (reading: Reading) => string][] = [
       ['MSE', ({ mse }) => mse.toExponential(2)],
       ['relative MSE', ({ relmse }) => relmse.toExponential(2)],
@@ -190,7 +201,7 @@ export class ErrorMeter {
     const rows = figures.map(([name, value]) => line(cell('th', name, 'row'), ...latest.map((reading) => cell('td', reading ? value(reading) : '–'))));
     const heads = latest.length > 1 ? [line(cell('td', ''), cell('th', 'A', 'col'), cell('th', 'B', 'col'))] : [];
     byId('errors-table', HTMLTableElement).replaceChildren(...(shown ? [...heads, ...rows] : []));
-    byId('errors-words', HTMLElement).textContent = this.kept ? this.otherView : words;
+    byId('errors-words', HTMLElement).textContent = this.kept ? this.otherViews : words;
     byId('errors-csv', HTMLButtonElement).disabled = this.curves.every((curve) => curve.readings.length === 0);
     this.plot();
   }

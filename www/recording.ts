@@ -14,7 +14,7 @@ const number = (id: string) => {
 /** What the pictures of an animation are put into. */
 interface Sequence {
   ending: string;
-  /** Renders the next moment, in seconds, of so many averaged frames, fewer where `signal` ends it, and puts it in. */
+  /** Renders the next moment, in seconds, of so many averaged frames, and puts it in. Rejects with `CANCELLED` as `renderAt`. */
   add(moment: number, samples: number, signal: AbortSignal): Promise<void>;
   finish(): Promise<Blob>;
   /** Lets go of it, finished or not. */
@@ -115,9 +115,14 @@ export class Recording {
       this.words.textContent = 'Frames, frames a second and averaged frames must be numbers within their ranges.';
       return;
     }
+    const { scene } = view;
+    if (!scene) {
+      this.words.textContent = 'There is no scene yet.';
+      return;
+    }
     const controller = (this.pictures = new AbortController());
     const { signal } = controller;
-    // A scene may take over before the first frame of a picture.
+    // A scene may take over between two pictures.
     const stop = () => controller.abort();
     view.addEventListener('load', stop);
     const others = [this.picturesButton, this.exactButton].filter((each) => each !== button);
@@ -125,30 +130,25 @@ export class Recording {
     button.textContent = 'Cancel';
     for (const other of others) other.disabled = true;
     const start = view.settings.time;
-    const { scene } = view;
     let film: Sequence | undefined;
     try {
       // All pictures are of one size, and so is what they are put into.
-      view.holdSize(true);
+      view.hold(true);
       film = await filmOf(rate);
-      for (let at = 0; at < count && !signal.aborted; at++) {
+      for (let at = 0; at < count; at++) {
         this.words.textContent = `Picture ${at + 1} of ${count}`;
         await film.add(start + at / rate, samples, signal);
-        if (view.scene !== scene || view.loading) throw { code: 'CANCELLED', message: 'Another scene was chosen: no pictures were saved.' };
       }
-      if (!signal.aborted) save(await film.finish(), `${this.name()}.${film.ending}`);
-      this.words.textContent = signal.aborted ? 'Cancelled.' : `${count} pictures saved.`;
+      save(await film.finish(), `${this.name()}.${film.ending}`);
+      this.words.textContent = `${count} pictures saved.`;
     } catch (error) {
       const { code, message } = error as Partial<Failure>;
-      this.words.textContent = message ?? '';
+      this.words.textContent = view.scene === scene ? (message ?? '') : 'Another scene was chosen.';
       if (code !== 'CANCELLED') showError(error);
     } finally {
       view.removeEventListener('load', stop);
+      view.hold(false);
       film?.close();
-      view.holdSize(false);
-      // Back to the moment that was shown, unless something else was asked for.
-      if (film && view.scene === scene && !view.loading) await view.show(view.settings, view.scene).catch(() => undefined);
-      // Last: the next recording begins with what this one has put back.
       this.pictures = undefined;
       button.textContent = label;
       for (const other of others) other.disabled = false;

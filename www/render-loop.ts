@@ -49,10 +49,14 @@ export class RenderLoop {
   paused = false;
   /** While nobody sees the picture no frame is rendered; calls are still made. */
   suspended = false;
+  /** While someone else renders by calls no frame is rendered either. */
+  held = false;
   /** Stops after so many accumulated frames, until something changes. */
   frameLimit = Infinity;
   private viewer: Viewer | undefined;
   private readonly queue: Work[] = [];
+  /** Each of a frame of its own. */
+  private readonly dissections: Work[] = [];
   private changed = false;
   /** Why there will be no viewer, until one is attached all the same. */
   private stopped: unknown;
@@ -76,7 +80,7 @@ export class RenderLoop {
   /** Rejects with `reason` all calls that wait, and those to come. */
   stop(reason: unknown): void {
     this.stopped = reason;
-    for (const { refuse } of this.queue.splice(0)) refuse(reason);
+    for (const { refuse } of [...this.queue.splice(0), ...this.dissections.splice(0)]) refuse(reason);
   }
 
   /** Stops for good. Resolves when nothing uses the viewer any more. */
@@ -93,6 +97,10 @@ export class RenderLoop {
 
   /** Runs `work` between two frames. Resolves or rejects as `work` does. */
   call<T>(work: (viewer: Viewer) => T | Promise<T>): Promise<T> {
+    return this.enqueue(this.queue, work);
+  }
+
+  private enqueue<T>(queue: Work[], work: (viewer: Viewer) => T | Promise<T>): Promise<T> {
     if (this.stopped !== undefined) return Promise.reject(this.stopped);
     return new Promise((resolve, refuse) => {
       const run = async (viewer: Viewer) => {
@@ -104,7 +112,7 @@ export class RenderLoop {
           refuse(error);
         }
       };
-      this.queue.push({ run, refuse });
+      queue.push({ run, refuse });
     });
   }
 
@@ -118,12 +126,9 @@ export class RenderLoop {
     });
   }
 
-  /** As `call`, for work that renders a frame, in which is what has changed until now. */
-  frame<T>(work: (viewer: Viewer) => Promise<T>): Promise<T> {
-    return this.call((viewer) => {
-      this.changed = false;
-      return work(viewer);
-    });
+  /** Renders the next frame dissected, even while paused. Resolves to what `read` makes of it before another one is rendered. */
+  dissect<T>(read: (viewer: Viewer) => Promise<T>): Promise<T> {
+    return this.enqueue(this.dissections, read);
   }
 
   /** Whether the picture has as many frames as it shall have. */
@@ -144,15 +149,25 @@ export class RenderLoop {
   private async turn(viewer: Viewer, seconds: number): Promise<void> {
     try {
       for (let work = this.queue.shift(); work; work = this.queue.shift()) await work.run(viewer);
-      if (this.suspended) return;
+      if (this.suspended || this.held) return;
       const changed = this.events.beforeFrame(viewer, seconds) || this.changed;
+      const dissection = this.dissections.shift();
       if (changed) this.frames = 0;
-      else if (this.paused || this.isComplete(viewer)) return;
+      else if (!dissection && (this.paused || this.isComplete(viewer))) return;
       this.changed = false;
       this.frames += 1;
       const start = performance.now();
-      await renderFrame(viewer, this.events.making);
+      try {
+        await renderFrame(viewer, this.events.making, dissection !== undefined);
+      } catch (error) {
+        if (!dissection) throw error;
+        dissection.refuse(error);
+        // There may be no room for its pictures; the next frame does without, or tells of a lost device.
+        this.changed = true;
+        return;
+      }
       this.events.afterFrame(viewer, performance.now() - start);
+      await dissection?.run(viewer);
     } catch (error) {
       this.viewer = undefined;
       this.events.failed(error);

@@ -5,6 +5,7 @@ import type { Viewer } from './pkg/restir.js';
 import type { Settings } from './url-state.js';
 import type { Scene } from './viewer-events.js';
 
+/** The camera of a picture, kept in its settings. */
 export class SceneCamera {
   /** What the user moves. */
   readonly orbit = new OrbitCamera();
@@ -32,7 +33,7 @@ export class SceneCamera {
   }
 
   /** Looks from `pose` through the lens of the chosen camera. Throws `BAD_VALUE`. */
-  stand(viewer: Viewer, pose: Pose): void {
+  setPose(viewer: Viewer, pose: Pose): void {
     const posed: Camera = { ...(this.scene()?.cameras[this.index] ?? { vertical_fov: 0.8 }), ...pose };
     viewer.set_camera(JSON.stringify(posed));
     this.settings.pose = pose;
@@ -40,7 +41,7 @@ export class SceneCamera {
   }
 
   /** Looks from where the user has moved to, which it returns. */
-  move(viewer: Viewer): Camera {
+  applyOrbit(viewer: Viewer): Camera {
     const camera = this.orbit.toCamera();
     viewer.set_camera(JSON.stringify(camera));
     this.settings.pose = camera;
@@ -48,7 +49,7 @@ export class SceneCamera {
   }
 
   /** After a frame through a camera that moves by itself: the user takes over from where it is. */
-  catchUp(viewer: Viewer): void {
+  syncOrbit(viewer: Viewer): void {
     const { pose } = this.settings;
     if (pose === undefined && this.scene()?.report.moving_cameras.includes(this.index)) this.take(viewer);
   }

@@ -5,6 +5,7 @@ import type { Viewer } from './pkg/restir.js';
 import { type Settings, defaultSettings } from './url-state.js';
 import type { ViewerFailure } from './viewer-events.js';
 
+/** What a renderer takes is kept in the settings; what it refuses is told, or thrown. */
 export class SettingsTaker {
   constructor(
     private readonly settings: Settings,
@@ -37,11 +38,11 @@ export class SettingsTaker {
     const preset = description().presets.find((known) => known.id === id);
     if (!preset) throw { code: 'UNKNOWN_NAME', message: `there is no preset ${id}` };
     const { values } = this.settings;
+    this.takeTechnique(viewer, preset.technique);
     for (const key of [...values.keys()].filter((name) => name.startsWith('render.'))) {
       viewer.set(key, String(parameterOf(preset.technique, key)?.default));
       values.delete(key);
     }
-    this.takeTechnique(viewer, preset.technique);
     for (const [key, value] of Object.entries(preset.settings)) {
       viewer.set(key, value);
       values.set(key, value);

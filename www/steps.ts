@@ -24,6 +24,8 @@ export class Steps {
   private passes: DissectedPass[] = [];
   /** Counts what was begun and ended: a frame that is taken apart meanwhile is of no use any more. */
   private turn = 0;
+  /** Whether a frame is about to be taken apart. */
+  private waits = false;
   private at = 0;
   /** Which of its files is shown: the pass's own, or one that it includes. */
   private file = '';
@@ -42,17 +44,20 @@ export class Steps {
     byId('steps-frame', HTMLButtonElement).addEventListener('click', () => void this.begin());
     byId('steps-back', HTMLButtonElement).addEventListener('click', () => this.go(this.at - 1));
     byId('steps-on', HTMLButtonElement).addEventListener('click', () => this.go(this.at + 1));
-    // A picture of something else is no frame of these passes.
-    for (const event of ['load', 'camera-change', 'param-change', 'restored'] as const) view.addEventListener(event, () => this.end());
-    // Nor does it lie over frames that go on, as after a change of size.
-    view.addEventListener('sample', () => !this.panel.hidden && this.end());
+    // A picture of something else is no frame of these passes, nor does one lie over frames that go on, as after a change of size. But
+    // what is still to be taken apart is the frame of what has changed.
+    for (const event of ['load', 'camera-change', 'param-change', 'restored', 'sample'] as const) {
+      view.addEventListener(event, () => !this.panel.hidden && !this.waits && this.end());
+    }
   }
 
   /** Renders the next frame and takes it apart. */
   private async begin(): Promise<void> {
     this.opening();
     const turn = ++this.turn;
+    this.waits = true;
     const passes = await this.view.dissect().catch(() => undefined);
+    this.waits = false;
     if (!passes || turn !== this.turn) return;
     this.passes = passes;
     this.panel.hidden = false;

@@ -43,6 +43,9 @@ export interface Settings {
   values: Map<string, string>;
 }
 
+/** Moments are within so many seconds of 0, and time runs at most so many times as fast as a clock. */
+export const [latest, fastest] = [1e9, 1e6] as const;
+
 export const defaultSettings = (): Settings => ({
   scene: 'cornell',
   sceneIndex: undefined,
@@ -95,6 +98,17 @@ function finite(text: string): number {
   return value;
 }
 
+function within(most: number, text: string): number {
+  const value = finite(text);
+  if (Math.abs(value) > most) throw new Error(`must be from ${-most} to ${most}`);
+  return value;
+}
+
+/** A moment in seconds. Throws what is wrong with it. */
+export function timeOf(text: string): number {
+  return within(latest, text);
+}
+
 function accumulate(text: string): boolean {
   if (text !== 'yes' && text !== 'no') throw new Error('must be yes or no');
   return text === 'yes';
@@ -122,8 +136,8 @@ const readers: Record<string, (state: Settings, text: string) => void> = {
   seed: (state, text) => (state.seed = integer(text, 0, 0xffffffff)),
   accumulate: (state, text) => (state.accumulate = accumulate(text)),
   lights: (state, text) => (state.lights = integer(text, 0, 1_000_000)),
-  time: (state, text) => (state.time = finite(text)),
-  speed: (state, text) => (state.speed = finite(text)),
+  time: (state, text) => (state.time = timeOf(text)),
+  speed: (state, text) => (state.speed = within(fastest, text)),
   animation: (state, text) => (state.animation = text),
   camera: (state, text) => (state.camera = text),
   pose: (state, text) => (state.pose = poseOf(text)),
@@ -133,20 +147,29 @@ const readers: Record<string, (state: Settings, text: string) => void> = {
   frames: (state, text) => (state.frames = integer(text, 1, 0xffffffff)),
 };
 
-/** Reads a query. Keys that are none of the page's are taken for parameters; what cannot be read becomes a warning. */
-export function readQuery(query: string): { state: Settings; warnings: string[] } {
+/** Whether a key is of all that is shown, not of one picture of two: not of its technique, view or parameters. */
+export const isShared = (key: string) => Object.hasOwn(readers, key) && key !== 'technique' && key !== 'view';
+
+/** A `name=value` that cannot be read, and why. */
+export interface Unread {
+  setting: string;
+  message: string;
+}
+
+/** Reads a query. Keys that are none of the page's are taken for parameters. */
+export function readQuery(query: string): { state: Settings; unread: Unread[] } {
   const state = defaultSettings();
-  const warnings: string[] = [];
+  const unread: Unread[] = [];
   for (const [key, text] of new URLSearchParams(query)) {
     const read = Object.hasOwn(readers, key) ? readers[key] : undefined;
     try {
       if (read) read(state, text);
       else state.values.set(key, text);
     } catch (error) {
-      warnings.push(`${key}=${text} in the address: ${(error as Error).message}`);
+      unread.push({ setting: `${key}=${text}`, message: (error as Error).message });
     }
   }
-  return { state, warnings };
+  return { state, unread };
 }
 
 /** The query for `state`, with only what differs from the defaults; empty where nothing does. */

@@ -20,7 +20,7 @@ export interface Sample {
 
 /** What went wrong. The last good picture stays on the canvas. */
 export interface ViewerFailure extends Failure {
-  /** `name=value` of a setting given to the constructor that was not taken; its default is used instead. */
+  /** `name=value` of one of many settings given at once, to the constructor or `show`, that was not taken; its default is used instead. `picture B: ` stands before one of a comparison's second picture. */
   setting?: string;
   /** The renderer has stopped: after `INTERNAL` only loading the page again helps, else `restore()` may. */
   stopped?: boolean;

@@ -17,7 +17,7 @@ import { RenderLoop, renderFrame } from './render-loop.js';
 import { Resolution, defaultBudget, longestSide } from './resolution.js';
 import { SceneCamera } from './scene-camera.js';
 import { SettingsTaker } from './settings-taker.js';
-import { type Settings, defaultSettings, writeQuery } from './url-state.js';
+import { type Settings, defaultSettings, fastest, latest, writeQuery } from './url-state.js';
 import type { Change, LoadOptions, Scene, ViewerEventMap } from './viewer-events.js';
 import { compileWasm, startWasm } from './wasm.js';
 
@@ -62,7 +62,7 @@ export class RestirViewer extends EventTarget {
   readonly settings: Settings;
   private readonly loader = new SceneLoader();
   private readonly taker: SettingsTaker;
-  private readonly sight: SceneCamera;
+  private readonly sceneCamera: SceneCamera;
   private readonly resolution: Resolution;
   private readonly fade: Fade;
   private readonly loop = new RenderLoop({
@@ -84,6 +84,7 @@ export class RestirViewer extends EventTarget {
   private rendered: [number, number] = [0, 0];
   /** Of the last frame. */
   private moment = 0;
+  private shownView = 'radiance';
   /** When devices were lost. */
   private losses: number[] = [];
   private halted = false;
@@ -98,7 +99,7 @@ export class RestirViewer extends EventTarget {
     super();
     this.settings = { ...defaultSettings(), ...settings, values: new Map(settings.values) };
     this.taker = new SettingsTaker(this.settings, (failure) => this.emit('error', failure));
-    this.sight = new SceneCamera(this.settings, () => this.shown);
+    this.sceneCamera = new SceneCamera(this.settings, () => this.shown);
     this.resolution = new Resolution(canvas);
     this.fade = new Fade(canvas);
     this.takeLimits();
@@ -119,7 +120,7 @@ export class RestirViewer extends EventTarget {
   load(scene: string, { environment, choice, ...view }: LoadOptions = {}): Promise<void> {
     const given = Object.fromEntries(Object.entries(view).filter(([, value]) => value !== undefined)) as View;
     return this.reported(async () => {
-      if (given.time !== undefined) checkRange('time', given.time, -1e9, 1e9);
+      if (given.time !== undefined) checkRange('time', given.time, -latest, latest);
       const source = sourceOf(scene);
       if (choice && source.kind !== 'builtin') source.choice = choice;
       await this.open(source, this.surroundingsFor(environment), given);
@@ -159,6 +160,7 @@ export class RestirViewer extends EventTarget {
       const settled = this.loader.busy || !this.wanted;
       this.loader.cancel();
       const all = { ...settings, values: new Map(settings.values) };
+      const before = JSON.stringify(this.camera());
       if (settled && this.isOf(settings, files)) {
         await this.loop.change((viewer) => {
           this.taker.forgetValues(viewer);
@@ -173,7 +175,7 @@ export class RestirViewer extends EventTarget {
         if (!files && source.kind !== 'builtin') source.choice = choice;
         await this.open(source, files ? files.surroundings : this.surroundingsFor(environment ?? null), all);
       }
-      this.emit('camera-change', this.camera());
+      if (JSON.stringify(this.camera()) !== before) this.emit('camera-change', this.camera());
       this.emit('param-change', { name: 'settings', value: undefined });
     });
   }
@@ -269,8 +271,8 @@ export class RestirViewer extends EventTarget {
     return this.reported(() =>
       this.loop.change((viewer) => {
         if (moving) this.resolution.move();
-        if (typeof camera === 'object') this.sight.stand(viewer, camera);
-        else this.sight.follow(viewer, String(camera));
+        if (typeof camera === 'object') this.sceneCamera.setPose(viewer, camera);
+        else this.sceneCamera.follow(viewer, String(camera));
         this.emit('camera-change', this.camera());
       }),
     );
@@ -285,26 +287,26 @@ export class RestirViewer extends EventTarget {
         const { surface } = JSON.parse((await viewer.inspection()) as string) as Inspection;
         viewer.inspect(Uint32Array.from(this.isInside(this.inspected) ? this.inspected : []));
         if (!surface) return;
-        this.sight.orbit.focus(surface.position);
-        this.emit('camera-change', this.sight.move(viewer));
+        this.sceneCamera.orbit.focus(surface.position);
+        this.emit('camera-change', this.sceneCamera.applyOrbit(viewer));
       }),
     );
   }
 
   /** The camera of the picture. */
   camera(): Camera {
-    return this.sight.orbit.toCamera();
+    return this.sceneCamera.orbit.toCamera();
   }
 
   /** Index of the scene's camera that was chosen last. */
   get cameraIndex(): number {
-    return this.sight.index;
+    return this.sceneCamera.index;
   }
 
   /** Goes to a moment of the scene, in seconds. */
   setTime(seconds: number): Promise<void> {
     return this.set('time', seconds, (viewer) => {
-      checkRange('time', seconds, -1e9, 1e9);
+      checkRange('time', seconds, -latest, latest);
       viewer.set_time(seconds);
       this.settings.time = seconds;
     });
@@ -313,7 +315,7 @@ export class RestirViewer extends EventTarget {
   /** How many times as fast the scene's time runs. */
   setSpeed(speed: number): Promise<void> {
     return this.set('speed', speed, (viewer) => {
-      checkRange('speed', speed, -1e6, 1e6);
+      checkRange('speed', speed, -fastest, fastest);
       viewer.set_speed(speed);
       this.settings.speed = speed;
     });
@@ -377,9 +379,9 @@ export class RestirViewer extends EventTarget {
     });
   }
 
-  /** While true all pictures are as large as the last one, whatever `settings` say: those of a recording are. */
-  holdSize(on: boolean): void {
-    this.resolution.held = on ? this.size : undefined;
+  /** While true only `renderAt` renders, and what would change the size or move the camera waits. */
+  hold(on: boolean): void {
+    this.loop.held = on;
   }
 
   /** Stops after so many averaged frames, until something changes; undefined goes on. */
@@ -405,7 +407,7 @@ export class RestirViewer extends EventTarget {
     }
     if (!this.input) {
       const end = new AbortController();
-      this.input = { controls: new Controls(this.canvas, this.sight.orbit, end.signal), end };
+      this.input = { controls: new Controls(this.canvas, this.sceneCamera.orbit, end.signal), end };
       const focus = ({ clientX, clientY }: MouseEvent) => {
         const pixel = pixelAt(this.canvas, this.rendered, clientX, clientY);
         if (pixel) void this.focus(...pixel);
@@ -490,25 +492,37 @@ export class RestirViewer extends EventTarget {
   }
 
   /**
-   * Renders a moment of the scene, in seconds, with so many averaged frames, as a link to it would; the settings stay. What it resolves to
-   * is what `capture` says of the types. It ends early, with the frames there are, by `signal`, or where another scene is loaded.
+   * Renders a moment of the scene, in seconds, with so many averaged frames, as a link to it would; then the picture goes on as before. What it
+   * resolves to is what `capture` says of the types. Rejects with `CANCELLED` by `signal`, or where another scene is asked for.
    */
   renderAt(seconds: number, frames: number, options: { type: 'rgba'; signal?: AbortSignal }): Promise<ImageData>;
   renderAt(seconds: number, frames: number, options?: { type?: 'png'; signal?: AbortSignal }): Promise<Blob>;
   renderAt(seconds: number, frames: number, { type = 'png', signal }: { type?: 'png' | 'rgba'; signal?: AbortSignal } = {}): Promise<ImageData | Blob> {
     return this.reported(async () => {
-      checkRange('time', seconds, -1e9, 1e9);
+      checkRange('time', seconds, -latest, latest);
       checkRange('frames', frames, 1, 0xffffffff, true);
+      const goOn = () => {
+        if (signal?.aborted) throw { code: 'CANCELLED', message: 'Cancelled.' };
+        if (this.opening) throw { code: 'CANCELLED', message: 'Another scene was chosen.' };
+      };
       const picture = await this.call(async (viewer) => {
+        goOn();
+        const before = viewer.time();
         viewer.set_accumulate(true);
         viewer.set_time(seconds);
         viewer.reset();
-        for (let frame = 0; frame < frames; frame++) {
-          // A load need not wait for a picture that nobody will have.
-          if (frame > 0 && (signal?.aborted || this.loading)) break;
-          await renderFrame(viewer);
+        try {
+          for (let frame = 0; frame < frames; frame++) {
+            await renderFrame(viewer);
+            goOn();
+          }
+          return await this.read(viewer);
+        } finally {
+          viewer.set_accumulate(this.accumulating);
+          viewer.set_time(before);
+          viewer.reset();
+          this.loop.step();
         }
-        return this.read(viewer);
       });
       return type === 'rgba' ? picture : pngOf(picture);
     });
@@ -554,7 +568,7 @@ export class RestirViewer extends EventTarget {
   readPicture(): Promise<Picture> {
     return this.call(async (viewer) => {
       const [width, height] = this.rendered;
-      return { view: this.settings.view, time: this.moment, width, height, pixels: (await viewer.read_picture()) as Float32Array };
+      return { view: this.shownView, time: this.moment, width, height, pixels: (await viewer.read_picture()) as Float32Array };
     });
   }
 
@@ -563,7 +577,8 @@ export class RestirViewer extends EventTarget {
     return this.reported(async () => {
       this.kept = undefined;
       this.kept = await this.readPicture();
-      await this.setSize([...this.rendered]);
+      const { width, height } = this.kept;
+      await this.setSize([width, height]);
     });
   }
 
@@ -611,12 +626,11 @@ export class RestirViewer extends EventTarget {
     return this.call(async (viewer) => JSON.parse((await viewer.inspection()) as string) as Inspection);
   }
 
-  /** Renders one frame, and resolves to what each of its passes wrote. */
+  /** Renders the next frame, even while paused, and resolves to what each of its passes wrote. */
   dissect(): Promise<DissectedPass[]> {
     return this.reported(() =>
-      this.loop.frame(async (viewer) => {
+      this.loop.dissect(async (viewer) => {
         const [width, height] = this.rendered;
-        await renderFrame(viewer, undefined, true);
         const passes = JSON.parse(viewer.dissection()) as { id: string; file: string; has_picture: boolean }[];
         const dissected: DissectedPass[] = [];
         try {
@@ -643,9 +657,9 @@ export class RestirViewer extends EventTarget {
 
   // Beginning and end
 
-  /** Makes the renderer anew from the scene that is shown. The viewer does so by itself unless devices are lost again and again. */
+  /** Once the renderer has stopped: makes it anew from the scene that was shown. The viewer does so by itself unless devices are lost again and again. */
   restore(): Promise<void> {
-    return this.reported(() => this.rebuild());
+    return this.reported(async () => void (this.halted && (await this.rebuild())));
   }
 
   /** Ends everything and frees the memory. What waits, and what is called later, rejects with `DISPOSED`. */
@@ -834,10 +848,10 @@ export class RestirViewer extends EventTarget {
     viewer.set_speed(settings.speed);
     viewer.set_time(settings.time);
     viewer.set_accumulate(this.accumulating);
-    const first = () => this.sight.follow(viewer, '0');
+    const first = () => this.sceneCamera.follow(viewer, '0');
     const { pose, camera } = settings;
-    if (pose) this.taker.attempt('pose', () => this.sight.stand(viewer, pose), first);
-    else if (this.shown?.cameras.length) this.taker.attempt(`camera=${camera}`, () => this.sight.follow(viewer, camera), first);
+    if (pose) this.taker.attempt('pose', () => this.sceneCamera.setPose(viewer, pose), first);
+    else if (this.shown?.cameras.length) this.taker.attempt(`camera=${camera}`, () => this.sceneCamera.follow(viewer, camera), first);
   }
 
   private isInside(pixel: [number, number] | undefined): pixel is [number, number] {
@@ -851,7 +865,7 @@ export class RestirViewer extends EventTarget {
     if (moved) {
       this.resolution.move();
       this.fade.end();
-      this.emit('camera-change', this.sight.move(viewer));
+      this.emit('camera-change', this.sceneCamera.applyOrbit(viewer));
     }
     const [width, height] = this.resolution.size();
     const resized = width !== this.rendered[0] || height !== this.rendered[1];
@@ -885,7 +899,8 @@ export class RestirViewer extends EventTarget {
     this.resolution.observe(milliseconds);
     this.fade.begin();
     this.moment = viewer.time();
-    this.sight.catchUp(viewer);
+    this.shownView = this.settings.view;
+    this.sceneCamera.syncOrbit(viewer);
     const [width, height] = this.rendered;
     this.emit('sample', { count: viewer.frames(), milliseconds, width, height, time: this.moment, complete: this.loop.isComplete(viewer) });
   }
@@ -895,8 +910,7 @@ export class RestirViewer extends EventTarget {
   }
 
   private async exr(): Promise<Blob> {
-    const { rendered, settings } = this;
-    const picture = await this.call((viewer) => readChannels(viewer, rendered, settings));
+    const picture = await this.call((viewer) => readChannels(viewer, this.rendered, this.settings));
     // Few pictures are saved so: fetched only now.
     const { encodeExr } = await import('./exr.js');
     return encodeExr(picture);

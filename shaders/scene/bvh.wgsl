@@ -157,11 +157,11 @@ fn unpack_planes(word: u32) -> vec4f {
     return vec4f(unpack4xU8(word));
 }
 
-// What the stack keeps of a child of the node `here >> 2`: which one it is, for it is read only when its turn comes. In software the child
-// itself, read with the node: there a texel more costs less than the code that reads it later.
-fn bvh_entry(here: u32, boxes: NodeBoxes, child: u32) -> u32 {
+// What the stack keeps of a child of the node `here >> 2`: which one it is, for it is read only when its turn comes. In software
+// the child itself, read with the node: there a texel more costs less than the code that reads it later.
+fn bvh_entry(here: u32, record: NodeRecord, child: u32) -> u32 {
     if is_software {
-        return boxes.children[child];
+        return record.children[child];
     }
     return here | child;
 }
@@ -210,10 +210,10 @@ fn bvh_visit(
     if counts_pixels {
         nodes_visited += 1u;
     }
-    let boxes = load_boxes(node);
-    let grid = boxes.grid;
-    let a = boxes.planes_0;
-    let b = boxes.planes_1;
+    let record = load_node(node);
+    let grid = record.grid;
+    let a = record.planes_0;
+    let b = record.planes_1;
     let steps = vec3f(
         bitcast<f32>((grid.w & 0xffu) * 0x800000u), bitcast<f32>((grid.w & 0xff00u) * 0x8000u),
         bitcast<f32>((grid.w & 0xff0000u) * 0x80u)
@@ -249,18 +249,18 @@ fn bvh_visit(
     }
     let here = node << 2u;
     if fourth < none {
-        (*stack)[*depth] = bvh_entry(here, boxes, fourth & 3u);
+        (*stack)[*depth] = bvh_entry(here, record, fourth & 3u);
         *depth += 1u;
     }
     if third < none {
-        (*stack)[*depth] = bvh_entry(here, boxes, third & 3u);
+        (*stack)[*depth] = bvh_entry(here, record, third & 3u);
         *depth += 1u;
     }
     if second < none {
-        (*stack)[*depth] = bvh_entry(here, boxes, second & 3u);
+        (*stack)[*depth] = bvh_entry(here, record, second & 3u);
         *depth += 1u;
     }
-    return bvh_child(bvh_entry(here, boxes, first & 3u));
+    return bvh_child(bvh_entry(here, record, first & 3u));
 }
 
 // A ray on its way through the tree.

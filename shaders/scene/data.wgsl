@@ -15,7 +15,7 @@ fn data_texel(index: u32) -> vec2u {
 }
 
 // Where a node's boxes lie, and how they are written down; in software its children, too.
-struct NodeBoxes {
+struct NodeRecord {
     grid: vec4u,
     planes_0: vec4u,
     planes_1: vec4u,
@@ -28,14 +28,14 @@ fn node_texel(node: u32, texel: u32) -> vec4u {
     return textureLoad(node_texels, first + vec2u(texel, 0u), 0);
 }
 
-fn load_boxes(node: u32) -> NodeBoxes {
+fn load_node(node: u32) -> NodeRecord {
     if is_software {
-        return NodeBoxes(node_texel(node, 0u), node_texel(node, 1u), node_texel(node, 2u), node_texel(node, 3u));
+        return NodeRecord(node_texel(node, 0u), node_texel(node, 1u), node_texel(node, 2u), node_texel(node, 3u));
     }
-    return NodeBoxes(nodes[node].grid, nodes[node].planes_0, nodes[node].planes_1, vec4u(0u));
+    return NodeRecord(nodes[node].grid, nodes[node].planes_0, nodes[node].planes_1, vec4u(0u));
 }
 
-// The reference to child `entry & 3` of node `entry >> 2`.
+// The reference to child `entry & 3` of node `entry >> 2`; not asked for in software, where a node brings its children.
 fn load_child(entry: u32) -> u32 {
     return nodes[entry >> 2u].children[entry & 3u];
 }

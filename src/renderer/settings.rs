@@ -162,11 +162,6 @@ impl Renderer {
         Ok(())
     }
 
-    /// Index of the animation that is played.
-    pub fn animation(&self) -> usize {
-        self.clip
-    }
-
     /// Goes to a moment, in seconds: the next frame shows it. The film starts again; the technique keeps its history and
     /// reprojects it. A reset comes back to this moment. Times that are not finite are ignored.
     pub fn set_time(&mut self, seconds: f64) {

@@ -196,11 +196,6 @@ impl Viewer {
         self.renderer.set_animation(name).js()
     }
 
-    /// Index of the animation that is played.
-    pub fn animation(&self) -> usize {
-        self.renderer.animation()
-    }
-
     /// The scene's cameras as a JSON list.
     pub fn cameras(&self) -> String {
         self.renderer.scene().cameras.iter().map(camera_to_json).collect::<serde_json::Value>().to_string()
@@ -235,12 +230,6 @@ impl Viewer {
     /// Starts again.
     pub fn reset(&mut self) {
         self.renderer.reset();
-    }
-
-    /// Renders one frame and presents it.
-    pub fn render(&mut self) -> JsResult<()> {
-        self.renderer.render_frame().js()?;
-        self.present()
     }
 
     /// Begins a frame that [`Viewer::finish`] ends and presents. Returns the number of pipelines that it waits for, each made by a call of

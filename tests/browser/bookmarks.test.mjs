@@ -37,6 +37,32 @@ async function picture(page) {
   return readDisplay(page);
 }
 
+test('a name that is being typed belongs to the view that is left; where the browser keeps nothing it is said', async () => {
+  const { page, problems } = await openPage(site, query);
+  try {
+    await waitForFrames(page, 1);
+    const [camera] = await entries(page);
+    await drag(page, 60, 10);
+    await page.click('#keep-view');
+    await chosen(page, 'View 1');
+    await page.click('#bookmark-name', { count: 3 });
+    await page.keyboard.type('Corner');
+    await page.mouse.move(100, 200);
+    await page.mouse.wheel({ deltaY: 100 });
+    await chosen(page, 'moved');
+    assert.deepEqual(await entries(page), [camera, 'Corner']);
+    await page.select('#camera', 'view-0');
+    await chosen(page, 'Corner');
+    await page.evaluate(() => (Storage.prototype.setItem = () => { throw new Error('no room'); }));
+    await page.click('#bookmark-delete');
+    await page.waitForFunction(() => document.getElementById('message-text').textContent.includes('no room'), { polling: 50 });
+    assert.deepEqual(await entries(page), [camera, 'Corner']);
+    assertNoProblems(problems);
+  } finally {
+    await page.close();
+  }
+});
+
 test('views are kept, chosen, named and deleted', async () => {
   const { page, problems } = await openPage(site, query);
   try {

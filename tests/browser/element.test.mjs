@@ -271,14 +271,26 @@ test('a device that fails before it says that it is lost is replaced as well', o
     destructible,
   ));
 
-test('a moment that is none is told, and the picture comes; a message goes when another scene is there', () =>
-  withElement('src="builtin:motion" technique="normals" max-samples="1" time="noon"', async (page) => {
+test('what is wrong with one attribute leaves the others; a message goes when another scene is there', () =>
+  withElement('src="builtin:motion" technique="normals" max-samples="1" time="noon" params="nonsense" compare="technique=ris&seed=x" seed="7"', async (page) => {
     await untilFrames(page, 1);
+    const all = [];
+    for (let at = 0; at < 3; at++) all.push((await told(page, 'error')).message);
+    for (const part of ['time=noon', 'nonsense', 'both pictures share it']) assert.ok(all.some((message) => message.includes(part)), `${part} in ${all}`);
+    assert.deepEqual(await page.evaluate(() => {
+      const { viewer, second } = document.querySelector('restir-viewer');
+      return [viewer.settings.seed, viewer.settings.time, second.settings.technique];
+    }), [7, 0, 'ris']);
+    await page.evaluate(() => document.querySelector('restir-viewer').setAttribute('time', '1e10'));
     const words = () => page.evaluate(() => {
       const { hidden, textContent } = document.querySelector('restir-viewer').shadowRoot.querySelector('p');
       return hidden ? '' : textContent;
     });
-    assert.match(await words(), /time=noon/);
+    assert.match((await told(page, 'error')).message, /time=1e10/);
+    assert.match(await words(), /time=1e10/);
+    await page.evaluate(() => document.querySelector('restir-viewer').viewer.load('builtin:cornell'));
+    assert.equal(await words(), '');
+    await page.evaluate(() => document.querySelector('restir-viewer').viewer.load('builtin:motion'));
     await page.evaluate(() => document.querySelector('restir-viewer').viewer.load('missing.glb').catch(() => undefined));
     assert.match(await words(), /missing\.glb/);
     await page.evaluate(() => document.querySelector('restir-viewer').viewer.load('builtin:cornell'));

@@ -40,7 +40,7 @@ test('a click on a pixel tells what the passes saw there, and the figures add up
     await page.click('#inspect');
     // The floor, left of the middle: 1280 by 800 shows 48 by 36 with bars left and right.
     await page.mouse.click(560, 660);
-    await inspectorSays(page, 'was chosen', 'Of 32 candidates', 'neighbour', 'history');
+    await inspectorSays(page, 'was chosen', 'Of 32 candidates', 'neighbour', 'History');
     const where = (await text(page, 'inspector-where')).match(/\d+/g).map(Number);
     assert.deepEqual(where, [Math.floor((560 - (1280 - 800 * (48 / 36)) / 2) / (800 / 36)), Math.floor(660 / (800 / 36))]);
     const { passes, joined, circles, chosen } = await reading(page, 'spatial-1');
@@ -106,7 +106,8 @@ test('why: the background has no surface, the light shines itself', () =>
         for (let x = 0; x < 40; x += 3) {
           const seen = await window.restir.call(async (viewer) => {
             viewer.inspect(Uint32Array.of(x, y));
-            viewer.render();
+            viewer.begin();
+            viewer.finish();
             return JSON.parse(await viewer.inspection());
           });
           if (!seen.surface) found.background ??= seen;
@@ -169,6 +170,17 @@ test('a picture of one pixel is taken apart as well, and ends when frames go on'
     assert.equal(await page.$eval('#message', ({ hidden }) => hidden), true);
   }));
 
+test('a frame is taken apart while a scene loads: its first one', () =>
+  open('?scene=cornell&size=16x12&technique=normals', async (page) => {
+    await waitForFrames(page, 1);
+    await page.select('#scene', 'veach-mis');
+    await page.click('#dissect');
+    await page.waitForSelector('#steps:not([hidden])');
+    await page.waitForFunction(() => location.search.includes('scene=veach-mis') && document.getElementById('loading').hidden, { polling: 50 });
+    assert.equal(await page.$eval('#pause', (button) => button.getAttribute('aria-pressed')), 'true');
+    assert.equal(await page.$eval('#message', ({ hidden }) => hidden), true);
+  }));
+
 test('maps of difference: against the reference, and against picture B', () =>
   open('?scene=cornell&size=32x24&technique=path-tracer&render.max_depth=1&frames=4', async (page) => {
     await waitForFrames(page, 4);
@@ -219,7 +231,8 @@ test('a double click turns the camera to what is there, which it then orbits', (
     const expected = await page.evaluate(async (px, py) => {
       return window.restir.call(async (viewer) => {
         viewer.inspect(Uint32Array.of(px, py));
-        viewer.render();
+        viewer.begin();
+        viewer.finish();
         return JSON.parse(await viewer.inspection()).surface.position;
       });
     }, Math.floor((x - 240) / 20), Math.floor(y / 20));

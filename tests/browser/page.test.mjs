@@ -140,6 +140,15 @@ test('dragging orbits, and pausing stops', () =>
     assert.notDeepEqual(await readDisplay(page), still);
   }));
 
+test('a key that is tapped between two frames turns the camera', () =>
+  withPage('?scene=cornell&technique=normals&size=16x16&frames=1', async (page) => {
+    await waitForFrames(page, 1);
+    await page.evaluate(() => {
+      for (const type of ['keydown', 'keyup']) document.getElementById('canvas').dispatchEvent(new KeyboardEvent(type, { code: 'ArrowLeft', key: 'ArrowLeft', bubbles: true, cancelable: true }));
+    });
+    await page.waitForFunction(() => location.search.includes('pose='), { polling: 50 });
+  }));
+
 test('time runs, stops and can be scrubbed, and the address keeps the moment', () =>
   withPage('?scene=motion&technique=normals&size=48x32&time=1', async (page) => {
     await waitForFrames(page, 1);

@@ -198,7 +198,7 @@ test('a reference is of one view and one moment', () =>
     await page.select('#difference', 'flip');
     await page.waitForFunction(() => document.getElementById('difference-words').textContent.includes('mean 0.0000'), { polling: 50 });
     await page.select('#view', 'albedo');
-    await words('The reference shows radiance, the picture albedo');
+    await words('The reference shows radiance, picture A albedo');
     assert.equal(await page.$eval('#errors-table', (table) => table.innerText), '');
     await page.waitForFunction(() => document.getElementById('difference-words').textContent.includes('shows albedo'), { polling: 50 });
     await page.select('#view', 'radiance');
@@ -209,14 +209,27 @@ test('a reference is of one view and one moment', () =>
       slider.dispatchEvent(new Event('input'));
     });
     await words('keep a new reference');
+    // Another technique and back again ends none; a resolution of one's own does, and is taken.
+    await waitForFrames(page, 4);
+    await page.click('#keep-reference');
+    await measured();
+    await page.select('#technique', 'ris');
+    await addressHas(page, 'technique=ris');
+    await waitForFrames(page, 4);
+    await page.goBack();
+    await addressHas(page, 'technique=normals');
+    await measured();
+    await page.select('#scale', '0.5');
+    await words('keep a new reference');
+    await page.waitForFunction(() => !location.search.includes('size='), { polling: 50 });
     assert.equal(await page.$eval('#errors-table', (table) => table.innerText), '');
   }));
 
 test('what an address says of a second picture and cannot be is a warning, too', () =>
-  open(`?scene=cornell&technique=normals&size=16x16&frames=1&b=${encodeURIComponent('technique=bogus&seed=x&film.exposure=loud')}`, async (page) => {
-    await page.waitForFunction(() => document.querySelectorAll('#warnings li').length === 3, { polling: 50 });
+  open(`?scene=cornell&technique=normals&size=16x16&frames=1&b=${encodeURIComponent('technique=bogus&seed=x&film.exposure=loud&size=9x9')}`, async (page) => {
+    await page.waitForFunction(() => document.querySelectorAll('#warnings li').length === 4, { polling: 50 });
     const told = await page.$$eval('#warnings li', (items) => items.map(({ textContent }) => textContent).sort());
-    for (const [at, name] of ['film.exposure=loud', 'seed=x', 'technique=bogus'].entries()) assert.match(told[at], new RegExp(`^picture B: ${name} in the address: `));
+    for (const [at, name] of ['film.exposure=loud', 'seed=x', 'size=9x9', 'technique=bogus'].entries()) assert.match(told[at], new RegExp(`^picture B: ${name} in the address: `));
   }));
 
 test('two pictures side by side: their own settings, one camera, a divider, and a link that holds both', () =>
@@ -293,15 +306,15 @@ test('links and commands say all that determines a picture', async () => {
   const query =
     '?scene=https://example.org/a/car.glb&scene-index=1&variant=midnight+blue&environment=sky:elevation=6&technique=ris&view=normal&seed=7' +
     '&accumulate=no&lights=5&time=1.5&speed=2&animation=walk&camera=2&pose=0,1,2,0,0,-1,0,1,0&size=64x48&scale=0.5&frames=9&candidates=3';
-  const { state, warnings } = readQuery(query);
-  assert.deepEqual(warnings, []);
+  const { state, unread } = readQuery(query);
+  assert.deepEqual(unread, []);
   assert.equal(writeQuery(state), query);
   assert.equal(
     commandLine(state, 'car.glb', 2.25, [64, 48], 9),
     "restir render car.glb --scene-index 1 --variant 'midnight blue' --technique ris --set candidates=3 --size 64x48 --frames 9 --seed 7 " +
       '--environment sky:elevation=6 --lights 5 --time 2.25 --animation walk --pose 0,1,2,0,0,-1,0,1,0 --view normal --accumulate no --out picture.png',
   );
-  assert.deepEqual(readQuery('?scene-index=x&size=9000x9').warnings.length, 2);
+  assert.deepEqual(readQuery('?scene-index=x&size=9000x9&time=2e9&speed=-1e7').unread.length, 4);
 });
 
 /** The colour of a pixel of a canvas-sized picture of RGBA bytes, as #rrggbb. */
