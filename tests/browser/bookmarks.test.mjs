@@ -53,12 +53,14 @@ test('a name that is being typed belongs to the view that is left; where the bro
     assert.deepEqual(await entries(page), [camera, 'Corner']);
     await page.select('#camera', 'view-0');
     await chosen(page, 'Corner');
+    await page.waitForSelector('#bookmark-row:not([hidden])');
     await page.evaluate(() => (Storage.prototype.setItem = () => { throw new Error('no room'); }));
     await page.click('#bookmark-delete');
     await page.waitForFunction(() => document.getElementById('message-text').textContent.includes('no room'), { polling: 50 });
     assert.deepEqual(await entries(page), [camera, 'Corner']);
     assertNoProblems(problems);
   } finally {
+    await page.evaluate(() => localStorage.clear());
     await page.close();
   }
 });
