@@ -126,7 +126,7 @@ class App {
       this.addWarnings();
     } catch (problem) {
       // The user has chosen something else meanwhile.
-      if (view.loading) return;
+      if (view.opening) return;
       // Without what could not be had: first the environment, then the scene, and with that how it was to be seen.
       if (environment !== undefined && !view.scene) await this.settle(view.load(scene, { environment: null, choice }));
       if (!view.scene) {
@@ -175,7 +175,7 @@ class App {
   private async settle(loading: Promise<void>): Promise<void> {
     const failed = await loading.then(() => false, () => true);
     // A load that made way for another leaves the bar to that.
-    if (this.view.loading) return;
+    if (this.view.opening) return;
     if (failed) hideProgress();
     if (this.view.scene) this.showSources(this.view.scene);
   }
@@ -222,7 +222,7 @@ class App {
     const showing = view.show(address.state, files);
     await this.settle(showing);
     // Gone further meanwhile, or there is nothing to compare with.
-    if ((await showing.then(() => false, () => true)) || view.loading) return;
+    if ((await showing.then(() => false, () => true)) || view.opening) return;
     if (address.second === undefined) compare.close();
     else await compare.show(address.second);
     this.showMenus();

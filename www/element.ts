@@ -247,7 +247,7 @@ export class RestirViewerElement extends HTMLElement {
       this.attempt(() => (view.time = time()));
       // What is wrong with them is of this load, which takes older messages away.
       const isTold = !this.message.hidden;
-      viewer.load(source, view).catch(() => (this.progress.hidden = !viewer.loading));
+      viewer.load(source, view).catch(() => (this.progress.hidden = !viewer.opening));
       this.isOfLoad = isTold;
       return;
     }

@@ -20,10 +20,20 @@ const chromiumSwitches = [
   '--disable-sync',
 ];
 
+// With CHROMIUM_GPU=yes the machine's own Vulkan driver is used instead, for measurements.
+const usesGpu = process.env.CHROMIUM_GPU === 'yes';
+const gpuSwitches = ['--no-sandbox', '--enable-unsafe-webgpu', '--enable-features=Vulkan', '--use-angle=vulkan', '--disable-vulkan-surface', '--ignore-gpu-blocklist'];
+
 const launchers = {
   // A copy of the switches, for puppeteer takes --enable-features out of the list it is given.
   chromium: (profile) =>
-    puppeteer.launch({ browser: 'chrome', executablePath: '/usr/bin/chromium', headless: true, userDataDir: profile, args: [...chromiumSwitches] }),
+    puppeteer.launch({
+      browser: 'chrome',
+      executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
+      headless: true,
+      userDataDir: profile,
+      args: [...(usesGpu ? gpuSwitches : chromiumSwitches)],
+    }),
   // WebGPU on lavapipe: the Vulkan driver comes from the environment that npm test sets.
   firefox: (profile) =>
     puppeteer.launch({

@@ -93,6 +93,13 @@ test('another scene is chosen while the first one loads', () =>
     await page.waitForFunction(() => location.search.includes('scene=furnace'), { polling: 50 });
     assert.ok(await page.$eval('#loading', (bar) => bar.hidden));
     assert.ok(await page.$eval('#message', (message) => message.hidden), 'nothing went wrong');
+  }, () => {
+    // So that the second scene is there before the first one's load has ended, which waits for the adapter.
+    const { requestAdapter } = GPU.prototype;
+    GPU.prototype.requestAdapter = async function (...given) {
+      await new Promise((resolve) => setTimeout(resolve, 1500));
+      return requestAdapter.apply(this, given);
+    };
   }));
 
 test('follows the window', () =>

@@ -1,5 +1,6 @@
 // npm run rival: paths a second of the page and of three-gpu-pathtracer, on the same scene in the same browser, in turns.
-// RIVAL_SECONDS (20) for each turn, RIVAL_SIZE (320x240); pictures of both in RIVAL_PICTURES, where it names a folder.
+// RIVAL_SECONDS (20) for each turn, RIVAL_SIZE (320x240); pictures of both in RIVAL_PICTURES, where it names a folder. RIVAL_BATCH (1) samples are given
+// to the device before it is waited for: on a GPU a sample takes less time than to wait for it.
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { root } from '../../scripts/environment.mjs';
@@ -10,6 +11,7 @@ const seconds = Number(process.env.RIVAL_SECONDS ?? 20);
 const folder = process.env.RIVAL_PICTURES;
 const [width, height] = (process.env.RIVAL_SIZE ?? '320x240').split('x').map(Number);
 const depth = 4;
+const batch = Number(process.env.RIVAL_BATCH ?? 1);
 
 /** Measures the rival: started and looked after, for one sample may take longer than the browser protocol waits. */
 async function measureRival(page, wanted) {
@@ -30,14 +32,23 @@ const turns = {
   async ours() {
     const { page } = await openPage(site, `?scene=cornell&technique=path-tracer&size=${width}x${height}&render.max_depth=${depth}&film.tone_map=linear`);
     await waitForFrames(page, 3);
-    const result = await page.evaluate(async (wait) => {
-      // Calls are made between two frames, when the device is idle.
-      const now = () => window.restir.call((viewer) => [viewer.frames(), performance.now()]);
-      const [frames, start] = await now();
-      await new Promise((resolve) => setTimeout(resolve, wait));
-      const [after, end] = await now();
-      return { samples: after - frames, milliseconds: end - start };
-    }, 1000 * seconds);
+    // Frame after frame in one call, for the page's own loop renders one for each that the screen shows.
+    await page.evaluate((wait, many) => {
+      window.result = undefined;
+      const measure = async (viewer) => {
+        const [frames, start] = [viewer.frames(), performance.now()];
+        while (performance.now() - start < wait) {
+          for (let sample = 0; sample < many; sample++) {
+            viewer.begin();
+            viewer.finish();
+          }
+          await viewer.idle();
+        }
+        return { samples: viewer.frames() - frames, milliseconds: performance.now() - start };
+      };
+      void window.restir.call(measure).then((result) => (window.result = result));
+    }, 1000 * seconds, batch);
+    const result = await page.waitForFunction(() => window.result, { polling: 200, timeout: 0 }).then((handle) => handle.jsonValue());
     save('ours', await page.evaluate(async (...size) => {
       const canvas = document.createElement('canvas');
       const bytes = await window.restir.call((viewer) => viewer.read_display());
@@ -49,7 +60,7 @@ const turns = {
     return result;
   },
   async theirs() {
-    const { page } = await openPage({ browser: site.browser, url: server.url }, `tests/browser/rival.html?size=${width}x${height}&bounces=${depth}`);
+    const { page } = await openPage({ browser: site.browser, url: server.url }, `tests/browser/rival.html?size=${width}x${height}&bounces=${depth}&batch=${batch}`);
     await page.waitForFunction(() => 'measure' in window, { polling: 50 });
     // Shaders are compiled, and first samples seen, before anything is measured.
     await measureRival(page, 1);
