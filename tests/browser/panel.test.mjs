@@ -330,6 +330,8 @@ test('a view of a number has a legend with its colours and ends, which can be fi
     await page.select('#view', 'BVH steps');
     await page.waitForFunction(() => document.getElementById('legend-high').textContent === '1024', { polling: 50 });
     assert.match(await words(), /nodes/);
+    // The whole picture: one more frame averaged brings the ends together.
+    await waitForFrames(page, 2);
     // The fit: the ends become those of the picture, are in the panel and the address, and colours reach from the first to the last.
     await page.click('#legend-fit');
     await page.waitForFunction(() => document.getElementById('legend-high').textContent !== '1024', { polling: 50 });

@@ -35,6 +35,16 @@ test('readings are drawn, and told under the pointer and by keys', async () => {
     const passes = await page.evaluate(async () => JSON.parse(await window.restir.call((viewer) => viewer.stats())).passes.length);
     assert.ok((await page.$$('#pass-history polygon')).length >= Math.max(1, passes));
 
+    // No reading comes between a key and its words.
+    await page.click('#pause');
+    await page.waitForFunction(
+      () => {
+        const before = window.lastReadings;
+        window.lastReadings = document.querySelector('#pass-history svg').getAttribute('aria-valuemax');
+        return before === window.lastReadings;
+      },
+      { polling: 700 },
+    );
     await page.evaluate(() => document.querySelector('#pass-history svg').focus());
     await page.keyboard.press('ArrowLeft');
     assert.match(await words(), /^1 reading before: /);
