@@ -46,6 +46,8 @@ const budgets: [string, string][] = [
 const menu = (id: string) => byId(id, HTMLSelectElement);
 const button = (id: string) => byId(id, HTMLButtonElement);
 
+const toggleFullscreen = () => (document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen());
+
 class App {
   private readonly query = readAddress(location.search);
   readonly view = new RestirViewer(byId('canvas', HTMLCanvasElement), this.query.state);
@@ -402,6 +404,10 @@ class App {
     button('save-exr').addEventListener('click', () => void this.save('exr'));
     button('copy-link').addEventListener('click', () => void this.copy(button('copy-link'), this.link()));
     button('copy-command').addEventListener('click', () => void this.copy(button('copy-command'), this.command()));
+    const fullscreen = button('fullscreen');
+    fullscreen.hidden = !document.fullscreenEnabled;
+    fullscreen.addEventListener('click', () => void toggleFullscreen().catch((error: unknown) => showError({ code: 'FULLSCREEN', message: (error as Error).message })));
+    document.addEventListener('fullscreenchange', () => fullscreen.setAttribute('aria-pressed', String(document.fullscreenElement !== null)));
     const help = byId('help', HTMLDialogElement);
     button('keys').addEventListener('click', () => help.showModal());
     button('fold').addEventListener('click', () => this.fold());
@@ -411,7 +417,7 @@ class App {
   private shortcut(event: KeyboardEvent): void {
     const typing = event.target instanceof Element && event.target.closest('a, button, dialog, input, select, summary');
     if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
-    const buttons: Record<string, string> = { ' ': 'pause', '.': 'step', r: 'reset', c: 'compare', h: 'fold', i: 'inspect', p: 'play', t: 'dissect', '?': 'keys' };
+    const buttons: Record<string, string> = { ' ': 'pause', '.': 'step', r: 'reset', c: 'compare', f: 'fullscreen', h: 'fold', i: 'inspect', p: 'play', t: 'dissect', '?': 'keys' };
     if (/^[1-9]$/.test(event.key)) return this.cameras.goTo(Number(event.key));
     if (event.key === 'x') return this.compare.flip();
     const id = buttons[event.key];

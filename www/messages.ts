@@ -26,6 +26,7 @@ const known: Record<string, { title: string; advice: string }> = {
     advice: 'The driver was reset, or ran out of memory. Restart; if it happens again, lower the resolution scale.',
   },
   SHADER: { title: 'A shader does not compile here', advice: 'This is a fault of restir: please report it with the text above.' },
+  FULLSCREEN: { title: 'The browser does not let the page fill the screen', advice: 'In a frame of another page, that page has to allow it (allow="fullscreen").' },
   CLIPBOARD: { title: 'The browser does not let the page copy', advice: 'Copy the text above by hand.' },
   NO_RECORDER: { title: 'This browser records no video', advice: 'Save the pictures one by one, or use a current Chrome, Edge or Firefox.' },
   STORAGE: { title: 'The browser keeps nothing for this page', advice: 'Allow the page to store data, or copy a link to the picture.' },

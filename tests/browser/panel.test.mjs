@@ -89,6 +89,26 @@ test('? lists the keys, and Escape closes the list', () =>
     assert.ok(await page.$eval('#help', (help) => !help.open));
   }));
 
+test('the page fills the screen and comes back, by button and by key', () =>
+  open(small, async (page) => {
+    await waitForFrames(page, 1);
+    const fills = (wanted) =>
+      page.waitForFunction(
+        (on) => (document.fullscreenElement !== null) === on && document.getElementById('fullscreen').getAttribute('aria-pressed') === String(on),
+        { polling: 50 },
+        wanted,
+      );
+    await page.click('#fullscreen');
+    await fills(true);
+    await page.focus('#canvas');
+    await page.keyboard.press('f');
+    await fills(false);
+    // Where it is refused that is said.
+    await page.evaluate(() => (document.documentElement.requestFullscreen = () => Promise.reject(new Error('not here'))));
+    await page.click('#fullscreen');
+    await page.waitForFunction(() => document.getElementById('message').innerText.includes('not here'), { polling: 50 });
+  }));
+
 test('passes are listed with their times, or it is said that they cannot be', () =>
   open('?scene=cornell&size=24x16', async (page) => {
     await unfold(page, 'timing');
