@@ -549,4 +549,8 @@ window.restir = {
   other: (work) => app.compare.other?.call(work) ?? Promise.reject(new Error('there is no second picture')),
 };
 
+// What nobody has foreseen is not silent either.
+addEventListener('error', ({ error, message }) => showError(error ?? { code: 'INTERNAL', message }));
+addEventListener('unhandledrejection', ({ reason }) => showError(reason));
+
 void app.open();

@@ -12,7 +12,12 @@ interface Reading extends Errors {
   frames: number;
   /** All that these took. */
   milliseconds: number;
+  /** Whether that is the time of their passes on the GPU; else it goes until the page heard that the device was done, which may be milliseconds later. */
+  onGpu: boolean;
 }
+
+/** How many frames took how long, by the page's clock. */
+type Taken = Pick<Reading, 'frames' | 'milliseconds'>;
 
 /** Measurements since a picture began. */
 interface Curve {
@@ -24,6 +29,8 @@ interface Curve {
 const mostCurves = 4;
 /** Milliseconds between two measurements, which read the picture back. */
 const interval = 300;
+/** Milliseconds between two questions for the time of a frame, which is much the same for all of a picture. */
+const timing = 3000;
 const [width, height, margin] = [320, 180, 34];
 
 const percent = (value: number | null, signed = false) =>
@@ -35,13 +42,22 @@ function decades(values: number[]): [number, number] {
   return [low, Math.max(Math.ceil(Math.log10(Math.max(...values))), low + 1)];
 }
 
+/** What frames took on the GPU, each since the last reading as long as `lastFrame`; by the page's clock where the device does not tell. */
+function onGpu({ frames, milliseconds }: Taken, lastFrame: number, before: Taken = { frames: 0, milliseconds: 0 }): Pick<Reading, 'milliseconds' | 'onGpu'> {
+  if (lastFrame === 0) return { milliseconds, onGpu: false };
+  return { milliseconds: before.milliseconds + (frames - before.frames) * lastFrame, onGpu: true };
+}
+
 /** The measurements of one picture. */
 class Track {
   curves: Curve[] = [];
   private measuring = false;
   /** The last frame of a picture, which came while another one was measured. */
-  private missed: Pick<Reading, 'frames' | 'milliseconds'> | undefined;
+  private missed: Taken | undefined;
   private last = 0;
+  /** Milliseconds of a frame on the GPU; 0 where the device does not tell. When it was asked. */
+  private gpuFrame = 0;
+  private timed = -Infinity;
   /** Of the picture that is being made. */
   private milliseconds = 0;
   private frames = 0;
@@ -58,12 +74,21 @@ class Track {
   }
 
   begin(): Curve {
+    this.timed = -Infinity;
     const { technique, values } = this.view.settings;
     const own = [...values].filter(([key]) => !key.startsWith('film.')).map(([key, value]) => `${key}=${value}`);
     const curve: Curve = { name: [...(this.name ? [this.name] : []), technique, ...own].join(' '), readings: [] };
     // What was begun and not measured is nothing.
     this.curves = [...this.curves.filter(({ readings }) => readings.length > 0), curve].slice(-mostCurves);
     return curve;
+  }
+
+  /** Asks now and then what a frame takes on the GPU: each time frames wait. */
+  private async time(): Promise<void> {
+    if (performance.now() - this.timed < timing) return;
+    const { passes } = await this.view.timings();
+    this.gpuFrame = passes.reduce((sum, { ms }) => sum + ms, 0);
+    this.timed = performance.now();
   }
 
   clear(): void {
@@ -81,24 +106,26 @@ class Track {
     this.frames = count;
     if (begins && this.view.accumulating) this.begin();
     if (begins) this.missed = undefined;
-    const reading = { frames: count, milliseconds: this.milliseconds };
+    const taken = { frames: count, milliseconds: this.milliseconds };
     if (this.measuring) {
-      if (complete) this.missed = reading;
-    } else if (begins || complete || performance.now() - this.last > interval) await this.measure(reading, reference);
+      if (complete) this.missed = taken;
+    } else if (begins || complete || performance.now() - this.last > interval) await this.measure(taken, reference);
   }
 
-  private async measure(reading: Pick<Reading, 'frames' | 'milliseconds'>, reference: Picture): Promise<void> {
+  private async measure(taken: Taken, reference: Picture): Promise<void> {
     this.measuring = true;
-    this.last = performance.now();
     const curve = this.curves.at(-1) ?? this.begin();
     try {
       // Between two frames: of the picture that this sample is of.
       const picture = await this.view.readPicture();
       if (picture.view !== reference.view) return;
+      await this.time();
       const errors = await errorsOf(picture, reference);
       if (this.reference() !== reference) return;
       // Frames that are not averaged are each a picture of their own.
-      curve.readings = this.view.accumulating ? [...curve.readings, { ...reading, ...errors }] : [{ ...reading, ...errors }];
+      const before = this.view.accumulating ? curve.readings : [];
+      const time = onGpu(taken, this.gpuFrame, before.at(-1));
+      curve.readings = [...before, { ...taken, ...time, ...errors }];
       this.measured();
     } catch (error) {
       // A lost device takes the picture, not the reference.
@@ -106,6 +133,8 @@ class Track {
       if (this.reference() === reference && code !== 'DEVICE') this.measured(message);
     } finally {
       this.measuring = false;
+      // From the end: frames shall come between measurements that are slow.
+      this.last = performance.now();
       const { missed } = this;
       this.missed = undefined;
       // The picture stands still, so it is still the one that was missed.
@@ -219,6 +248,7 @@ export class ErrorMeter {
     const [y0, y1] = decades(all.map(([, y]) => y));
     const atX = (x: number) => margin + ((Math.log10(x) - x0) / (x1 - x0)) * (width - margin - 8);
     const atY = (y: number) => 6 + ((y1 - Math.log10(y)) / (y1 - y0)) * (height - margin);
+    const isOnGpu = drawn.every(({ readings }) => readings.every((reading) => reading.onGpu));
     const picture = svgElement('svg', { viewBox: `0 0 ${width} ${height}`, role: 'img', 'aria-label': `MSE against ${byTime ? 'time' : 'frames'}` });
     for (let power = x0; power <= x1; power++) {
       const x = atX(10 ** power);
@@ -228,7 +258,7 @@ export class ErrorMeter {
       const y = atY(10 ** power);
       picture.append(svgElement('line', { x1: margin, x2: width - 8, y1: y, y2: y, class: 'grid' }), svgElement('text', { x: margin - 4, y: y + 3, 'text-anchor': 'end' }, `1e${power}`));
     }
-    picture.append(svgElement('text', { x: width / 2, y: height - 2, 'text-anchor': 'middle' }, byTime ? 'milliseconds' : 'frames'));
+    picture.append(svgElement('text', { x: width / 2, y: height - 2, 'text-anchor': 'middle' }, byTime ? (isOnGpu ? 'milliseconds on the GPU' : 'milliseconds') : 'frames'));
     for (const [index, curve] of drawn.entries()) {
       const line = points(curve).map(([x, y]) => `${atX(x).toFixed(1)},${atY(y).toFixed(1)}`).join(' ');
       picture.append(svgElement('polyline', { points: line, class: `curve curve-${index}` }));
@@ -247,9 +277,11 @@ export class ErrorMeter {
   private save(): void {
     const quoted = (text: string) => `"${text.replaceAll('"', '""')}"`;
     const lines = this.curves.flatMap(({ name, readings }) =>
-      readings.map(({ frames, milliseconds, mse, relmse, mape, bias, flip }) => [quoted(name), frames, milliseconds.toFixed(3), mse, relmse, mape ?? '', bias ?? '', flip].join(',')),
+      readings.map(({ frames, milliseconds, mse, relmse, mape, bias, flip, onGpu: isGpu }) =>
+        [quoted(name), frames, milliseconds.toFixed(3), mse, relmse, mape ?? '', bias ?? '', flip, isGpu ? 'GPU' : 'page'].join(','),
+      ),
     );
-    const csv = ['series,frames,milliseconds,mse,relmse,mape,bias,flip', ...lines, ''].join('\n');
+    const csv = ['series,frames,milliseconds,mse,relmse,mape,bias,flip,clock', ...lines, ''].join('\n');
     save(new Blob([csv], { type: 'text/csv' }), 'errors.csv');
   }
 }

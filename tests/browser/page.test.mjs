@@ -329,6 +329,21 @@ test('something that is no scene is refused in words', () =>
     assert.match(await waitForMessage(page), /notes\.txt is neither/);
   }));
 
+test('what nobody has foreseen is told', async () => {
+  const { page } = await openPage(site, '?scene=cornell&technique=normals&size=16x16&frames=1');
+  try {
+    await waitForFrames(page, 1);
+    // In a script of the page's: what a test runs by itself is told without its words.
+    for (const [name, text] of [['first', "setTimeout(() => { throw new Error('first fault'); })"], ['second', "void Promise.reject(new Error('second fault'))"]]) {
+      await page.evaluate((code) => document.head.append(Object.assign(document.createElement('script'), { textContent: code })), text);
+      await page.waitForFunction((wanted) => document.getElementById('message').innerText.includes(`${wanted} fault`), { polling: 50 }, name);
+      await page.click('#message-close');
+    }
+  } finally {
+    await page.close();
+  }
+});
+
 test('a browser without WebGPU is told so', () =>
   withPage(
     '',

@@ -189,9 +189,12 @@ test('errors against a reference are those of the command line, are drawn, and e
       { polling: 200 },
     );
     const csv = await page.evaluate(() => window.saved);
-    const [name, , , mse] = lastOf(csv);
+    const [name, frames, milliseconds, mse, , , , , clock] = lastOf(csv);
+    const passes = await page.evaluate(async () => JSON.parse(await window.restir.call((viewer) => viewer.stats())).passes.map(({ ms }) => ms));
+    assert.equal(clock, passes.some((ms) => ms > 0) ? 'GPU' : 'page');
+    assert.ok(Number(frames) === 64 && Number(milliseconds) > 0, lastOf(csv).join());
     assert.equal(name, '"ris render.max_depth=1"');
-    assert.match(csv, /^series,frames,milliseconds,mse,relmse,mape,bias,flip\n"path-tracer/);
+    assert.match(csv, /^series,frames,milliseconds,mse,relmse,mape,bias,flip,clock\n"path-tracer/);
     const common = ['--size', '24x16', '--frames', '64', '--set', 'render.max_depth=1'];
     const native = await compareNatively('builtin:cornell', [...common, '--technique', 'ris'], [...common, '--technique', 'path-tracer']);
     assert.ok(Math.abs(Number(mse) / native.mse - 1) < 0.05, `${mse} here, ${native.mse} there`);
