@@ -12,8 +12,6 @@ export class Resolution {
   /** What the user asked for; undefined adapts. */
   fixedSize: [number, number] | undefined;
   fixedScale: number | undefined;
-  /** What goes before all that for a while. */
-  held: [number, number] | undefined;
   private readonly automatic = new FrameBudget();
   private movedAt = -Infinity;
   private inMotion = false;
@@ -39,7 +37,7 @@ export class Resolution {
 
   /** Whether the scale adapts. */
   get adapts(): boolean {
-    return !this.held && !this.fixedSize && this.fixedScale === undefined;
+    return !this.fixedSize && this.fixedScale === undefined;
   }
 
   /** The camera moves: until it rests, frames come in time rather than sharp. */
@@ -49,8 +47,7 @@ export class Resolution {
 
   /** Width and height to render, in pixels. */
   size(): [number, number] {
-    const fixed = this.held ?? this.fixedSize;
-    if (fixed) return fixed;
+    if (this.fixedSize) return this.fixedSize;
     this.inMotion = performance.now() - this.movedAt < restAfter;
     const scale = (this.fixedScale ?? this.automatic.scale(this.inMotion)) * devicePixelRatio;
     const side = (length: number) => Math.min(Math.max(Math.round(length * scale), 1), longestSide);
